@@ -38,7 +38,7 @@ def seen(metrics, of, *ticks):
     return metrics.end(None)["metrics"]
 
 
-def test_a_level_has_final_mean_min_and_max_over_the_ticks():
+def test_level_has_final_mean_min_and_max_over_the_ticks():
     of = static(2)
     [found] = seen(Metrics(["order"]), of, *({"pose": poses([0.0, turn])} for turn in (0.0, np.pi, np.pi / 2)))
     half = np.sqrt(0.5)
@@ -46,7 +46,7 @@ def test_a_level_has_final_mean_min_and_max_over_the_ticks():
     assert found["order"] == {name: pytest.approx(value, abs=1e-15) for name, value in expected.items()}
 
 
-def test_a_count_ends_with_its_total_and_has_statistics_of_what_a_tick_added():
+def test_count_ends_with_its_total_and_statistics_of_its_increments():
     of = static(2, arenas=2)
     onsets = ({"contact_onsets": np.array(pairs)} for pairs in ([[1, 0], [0, 2]], [[0, 0], [0, 2]], [[3, 0], [0, 0]]))
     first, second = seen(Metrics(), of, *onsets)
@@ -71,18 +71,18 @@ def test_ticks_without_a_value_are_left_out_and_what_never_had_one_is_null():
     assert found["largest_component"] == dict.fromkeys(("final", "mean", "min", "max"))
 
 
-def test_a_run_without_a_tick_has_null_everywhere():
+def test_metrics_of_a_run_without_a_tick_are_null():
     [found] = seen(Metrics(["order"]), static())
     assert found["order"] == dict.fromkeys(("final", "mean", "min", "max"))
 
 
-def test_the_summary_is_plain_json():
+def test_metrics_summary_is_plain_json():
     of = static(3, arenas=2)
     found = seen(Metrics(), of, {"edges": edges((0, 1))})
     assert json.loads(json.dumps(found, allow_nan=False)) == found
 
 
-def test_a_metric_with_parameters_is_given_as_an_object():
+def test_metric_with_parameters_is_passed_as_an_object():
     of = static(3)
     [found] = seen(Metrics(["order", Turned(above_rad=1.0)]), of, {"pose": poses([0.0, 2.0, 3.0])})
     assert list(found) == ["order", "turned"]
@@ -92,7 +92,7 @@ def test_a_metric_with_parameters_is_given_as_an_object():
 @pytest.mark.parametrize(
     ("names", "hint"), [(["ordre"], "'ordre'"), (["order", "order"], "'order'"), (["order", Order()], "'order'")]
 )
-def test_an_unknown_name_and_one_given_twice_are_refused(names, hint):
+def test_unknown_and_duplicate_metric_names_are_refused(names, hint):
     with pytest.raises(BadInput, check=lambda error: error.key == "metrics" and hint in error.expected):
         Metrics(names)
 
@@ -162,11 +162,11 @@ def sampled_in(every_s, ticks=12):
         (1.0, [0] * 10 + [10] * 2),
     ],
 )
-def test_a_sampled_metric_is_measured_at_the_start_and_at_each_multiple(every_s, ticks):
+def test_sampled_metric_is_measured_at_the_start_and_each_multiple(every_s, ticks):
     assert sampled_in(every_s) == ticks
 
 
-def test_one_sampled_metric_serves_many_runs():
+def test_sampled_metric_serves_many_runs():
     metrics, of = Metrics([Ticks()]), static(1)
     for tick in (3, 7):
         metrics.begin(of)
@@ -246,30 +246,30 @@ def script(comparison="at_least", limit=1.0, hold_s=0.0):
         ([1.0], script("below"), None),
     ],
 )
-def test_the_stop_time_is_where_the_first_stretch_that_held_began(series, condition, stop):
+def test_stop_time_is_the_start_of_the_first_stretch_that_held(series, condition, stop):
     stop_time_s, over = stop or (None, None)
     assert one(series, condition) == (stop_time_s, str(condition) if stop else None, over)
 
 
-def test_a_condition_is_told_in_words():
+def test_condition_is_written_in_words():
     assert str(script()) == "script at least 1"
     assert str(script("above", 0.0, 0.2)) == "script above 0 for 0.2 s"
 
 
-def test_of_several_conditions_any_is_enough_and_the_first_is_named():
+def test_stop_conditions_end_by_any_and_name_the_first():
     first, second = script("at_least", 2.0), script("above", 0.0, 0.2)
     assert one([0, 2, 2], first, second)[:2] == (0.1, str(first))
     assert one([1, 1, 2], first, second)[:2] == (0.2, str(first))
     assert one([1, 1, 1], first, second)[:2] == (0.0, str(second))
 
 
-def test_a_condition_that_keeps_the_arena_running_only_notes_its_time():
+def test_condition_that_keeps_the_arena_running_only_notes_its_time():
     aligned, slow = Condition("script", "at_least", 1.0, keep_running=True), script("at_least", 3.0)
     assert one([0, 1, 0, 1], aligned) == (0.1, str(aligned), None)
     assert one([0, 1, 0, 3, 0], aligned, slow) == (0.1, str(aligned), 3)
 
 
-def test_a_count_is_compared_by_its_total():
+def test_condition_on_a_count_compares_its_total():
     assert one([1, 2, 0, 3], Condition("tallied", "at_least", 6.0), kind=Tallied)[2] == 3
 
 
@@ -287,7 +287,7 @@ def test_a_count_is_compared_by_its_total():
         max_size=3,
     ),
 )
-def test_each_arena_ends_as_the_definition_reads(values, conditions):
+def test_stop_conditions_are_those_of_the_definition(values, conditions):
     stops, found = judged(values, *conditions)
     for arena, series in enumerate(zip(*values, strict=True)):
         stop = by_definition(series, conditions)

@@ -143,13 +143,13 @@ def compiled() -> None:
     measure(make(1, "torus", 1.0, 4, 2, 0.2))
 
 
-def test_every_metric_has_its_laws() -> None:
+def test_laws_exist_for_every_metric() -> None:
     assert set(LAWS) == set(METRICS)
 
 
 @law
 @given(histories(["walls", "open"]), st.floats(-2, 2), st.floats(-2, 2), st.floats(-np.pi, np.pi), st.booleans())
-def test_it_does_not_matter_where_the_scene_is_nor_how_it_is_turned(
+def test_moved_turned_or_mirrored_scene_has_equal_metrics(
     history: History, x_m: float, y_m: float, turn_rad: float, mirror: bool
 ) -> None:
     elsewhere = placed(history, (x_m, y_m), turn_rad, mirror)
@@ -158,13 +158,13 @@ def test_it_does_not_matter_where_the_scene_is_nor_how_it_is_turned(
 
 @law
 @given(histories(), st.sampled_from([0.0, np.pi]), st.booleans())
-def test_an_arena_has_no_sides_of_its_own(history: History, turn_rad: float, mirror: bool) -> None:
+def test_arena_turned_or_mirrored_has_equal_metrics(history: History, turn_rad: float, mirror: bool) -> None:
     assert not broken(measure(placed(history, (0.0, 0.0), turn_rad, mirror)), measure(history))
 
 
 @law
 @given(histories(["torus"]), st.floats(-8, 8), st.floats(-6, 6))
-def test_a_torus_has_no_seam(history: History, x_m: float, y_m: float) -> None:
+def test_torus_moved_across_its_seam_has_equal_metrics(history: History, x_m: float, y_m: float) -> None:
     moved = placed(history, (x_m, y_m))
     assert not broken(measure(moved), measure(history), but=lambda laws: not laws.anywhere)
 
@@ -178,7 +178,7 @@ def test_on_a_torus_of_more_than_twice_its_size_a_swarm_has_what_it_has_on_a_pla
 
 @law
 @given(histories())
-def test_an_arena_alone_has_what_it_has_beside_others_to_the_last_bit(history: History) -> None:
+def test_arena_alone_has_the_exact_metrics_it_has_beside_others(history: History) -> None:
     together = measure(history)
     for arena in range(history.static.arenas):
         alone = measure(arena_alone(history, arena))[:, :, 0]
@@ -188,9 +188,7 @@ def test_an_arena_alone_has_what_it_has_beside_others_to_the_last_bit(history: H
 
 @law
 @given(histories(), st.integers(0, 2), st.integers(1, TICKS - 1))
-def test_an_arena_that_left_keeps_its_values_and_changes_none_elsewhere(
-    history: History, arena: int, tick: int
-) -> None:
+def test_arena_that_left_keeps_its_values_and_changes_no_others(history: History, arena: int, tick: int) -> None:
     arena %= history.static.arenas
     values, summary = measured(tried(), arena_left(history, arena, tick))
     cut_values, cut_summary = measured(tried(), replace(history, ticks=history.ticks[:tick]))
@@ -214,33 +212,33 @@ def test_robots_and_packets_have_no_order(history: History, seed: int) -> None:
 
 @law
 @given(histories(), st.integers(0, 100))
-def test_it_does_not_matter_where_the_dead_are_nor_what_they_do(history: History, seed: int) -> None:
+def test_dead_robots_position_and_actions_change_no_metric(history: History, seed: int) -> None:
     elsewhere = with_the_dead_elsewhere(history, np.random.default_rng(seed))
     assert not broken(measure(elsewhere)[-1], measure(history)[-1], but=lambda laws: laws.dead)
 
 
 @law
 @given(histories())
-def test_a_robot_that_never_lives_might_as_well_not_be_there(history: History) -> None:
+def test_robot_that_never_lives_changes_no_metric(history: History) -> None:
     lives = history.alive.any(axis=(0, 1))
     assert not broken(measure(robots_taken(history, np.flatnonzero(lives))), measure(history))
 
 
 @law
 @given(histories())
-def test_a_tick_in_which_nothing_happens_changes_nothing(history: History) -> None:
+def test_tick_without_events_changes_no_metric(history: History) -> None:
     before, after = measure(and_then_nothing(history))[-2:]
     expected = [(laws.pause or same)(own) for laws, own in zip(LAWS.values(), before, strict=True)]
     assert not broken(after, np.array(expected), but=lambda laws: laws.pause is None)
 
 
 @pytest.mark.parametrize("robots", [1, 5])
-def test_a_swarm_of_the_dead_has_the_value_of_nobody_in_every_tick(robots: int) -> None:
+def test_dead_swarm_has_the_value_of_nobody_in_every_tick(robots: int) -> None:
     expected = np.array([[laws.nobody] for laws in LAWS.values()])
     assert not broken(measure(at_rest(robots, alive=False)), np.broadcast_to(expected, (TICKS, len(LAWS), 1)))
 
 
-def test_one_robot_alone_has_its_known_value() -> None:
+def test_lone_robot_has_its_known_value_of_each_metric() -> None:
     expected = np.array([[laws.lone] for laws in LAWS.values()])
     assert not broken(measure(at_rest(1, alive=True))[-1], expected)
 
@@ -256,7 +254,7 @@ def test_without_a_radio_only_what_tells_of_it_has_no_value(history: History) ->
 
 @law
 @given(histories())
-def test_a_metric_serves_many_runs_and_changes_none_of_them(history: History) -> None:
+def test_metric_object_serves_many_runs_alike(history: History) -> None:
     first = measure(history)
     np.testing.assert_array_equal(measure(history), first)
 
@@ -291,7 +289,7 @@ def witnesses(name: str) -> Callable[[History], bool] | None:
 
 
 @pytest.mark.parametrize("name", [name for name in LAWS if witnesses(name)])
-def test_an_exemption_is_needed(name: str) -> None:
+def test_exemption_from_a_law_has_a_witness(name: str) -> None:
     witness = witnesses(name)
     assert witness
     runs = (make(seed, "walls", 0.2 + seed % 3 * 0.4, 7, 2, 0.2) for seed in range(40))

@@ -65,20 +65,20 @@ def test_without_the_standard_ones_there_is_what_is_listed(east):
     assert names(with_standard=False) == []
 
 
-def test_a_standard_one_that_is_listed_keeps_its_place_and_takes_the_parameters():
+def test_standard_metric_that_is_listed_keeps_its_place_with_parameters():
     found = select_metrics([item("fragmentations", hold_s=3)], "s.toml").metrics
     assert [metric.name for metric in found] == standard_names()
     assert METRICS["fragmentations"](hold_s=3.0) in found
     assert select_metrics([item("order")], "s.toml") == select_metrics([], "s.toml")
 
 
-def test_a_class_takes_parameters_and_is_told_as_code(east):
+def test_metric_class_of_a_file_takes_parameters_and_is_noted_as_code(east):
     found = select_metrics([item(east, from_m=2)], "s.toml", with_standard=False)
     assert [(metric.name, metric.from_m) for metric in found.metrics] == [("east", 2.0)]
     assert found.code == (east,)
 
 
-def test_what_ends_an_arena_is_measured_once_with_the_parameters_that_are_listed(east):
+def test_stop_metric_is_measured_once_with_its_listed_parameters(east):
     assert names(stop("order"), with_standard=False) == ["order"]
     assert names(item(east), stop("east"), with_standard=False) == ["east"]
     [only] = select_metrics([item("fragmentations", hold_s=3), stop("fragmentations")], "", with_standard=False).metrics
@@ -99,13 +99,13 @@ def test_what_ends_an_arena_is_measured_once_with_the_parameters_that_are_listed
         (item("order", gap_m=1), "metrics.0.gap_m", "none"),
     ],
 )
-def test_what_is_no_metric_or_does_not_fit_is_refused_with_its_key(asked, key, hint):
+def test_unknown_metric_or_parameter_is_refused_with_its_key(asked, key, hint):
     error = refused(asked)
     assert (error.where, error.key) == ("s.toml", key)
     assert hint in error.expected
 
 
-def test_one_name_is_measured_once(east):
+def test_metric_listed_twice_is_refused(east):
     for spec, params, key in (("order", {}, "metrics.1"), (east, {"from_m": 1}, "metrics.1.metric")):
         error = refused(item(spec), item(spec, 1, **params))
         assert (error.where, error.key) == ("s.toml", key)
@@ -118,7 +118,7 @@ def site(tmp_path, monkeypatch):
     return tmp_path / "site"
 
 
-def test_a_package_brings_metrics_by_name(site):
+def test_package_provides_metrics_by_name(site):
     install(site, "compass_metrics", {"east": "East"})
     found = select_metrics([item("east", from_m=1)], "s.toml", with_standard=False)
     assert [metric.from_m for metric in found.metrics] == [1.0]
@@ -127,7 +127,7 @@ def test_a_package_brings_metrics_by_name(site):
     assert "east?" in refused(item("eest")).expected
 
 
-def test_a_plug_in_is_imported_only_if_it_is_asked_for(site):
+def test_plug_in_is_imported_only_if_it_is_listed(site):
     install(site, "broken_metrics", {"east": "East"}, code="raise ValueError('no such day')")
     assert names() == standard_names()
     error = refused(item("east"))
@@ -139,7 +139,7 @@ def test_a_plug_in_is_imported_only_if_it_is_asked_for(site):
 @pytest.mark.parametrize(
     ("packages", "hint"), [(["named_metrics"], "named_metrics:East"), (["one_metrics", "more_metrics"], "package")]
 )
-def test_a_plug_in_of_another_name_or_from_two_packages_is_refused(site, packages, hint):
+def test_plug_in_with_another_name_or_from_two_packages_is_refused(site, packages, hint):
     for package in packages:
         install(site, package, {"west": "East"})
     error = refused(item("west"))
@@ -148,19 +148,19 @@ def test_a_plug_in_of_another_name_or_from_two_packages_is_refused(site, package
     assert hint in error.expected
 
 
-def test_a_name_of_swarmwires_own_stays_its_own(site):
+def test_plug_in_cannot_replace_a_built_in_metric(site):
     install(site, "taken_metrics", {"order": "East"})
     assert type(select_metrics([item("order")], "s.toml", with_standard=False).metrics[0]) is METRICS["order"]
 
 
-def test_what_packages_bring_is_known_by_name_before_anything_is_imported(tmp_path, monkeypatch):
+def test_plug_ins_are_known_by_name_without_an_import(tmp_path, monkeypatch):
     install(tmp_path, "compass_metrics", {"east": "East"}, code="raise RuntimeError")
     monkeypatch.syspath_prepend(tmp_path)
     assert plug_ins()["east"] == PlugIn("east", "compass_metrics:East", "compass_metrics", twice=False)
     assert f"[{ENTRY_POINT_GROUP}]" in (tmp_path / "compass_metrics-1.0.dist-info" / "entry_points.txt").read_text()
 
 
-def test_a_name_that_two_packages_bring_is_told_twice(tmp_path, monkeypatch):
+def test_plug_in_of_two_packages_is_marked_as_twice(tmp_path, monkeypatch):
     install(tmp_path, "one_metrics", {"east": "East"})
     install(tmp_path, "other_metrics", {"east": "East"})
     monkeypatch.syspath_prepend(tmp_path)
@@ -208,7 +208,7 @@ def spec_of(kind: type) -> str:
     return f"{__name__}:{kind.__name__}"
 
 
-def test_a_good_one_is_measured():
+def test_custom_metric_is_measured():
     assert _measure(custom_metric_class(spec_of(Good), "s.toml", "metrics.0")()).latest["mine"].tolist() == [7.0]
 
 
@@ -222,7 +222,7 @@ def test_bounds_of_a_metric_are_numbers_or_none(monkeypatch, bounds):
 @pytest.mark.parametrize(
     ("kind", "hint"), [(Plain, "dataclass.*:Plain"), (Endless, "Endless.*begin"), (str, "no such name.*'str'")]
 )
-def test_a_class_that_is_no_metric_is_refused(kind, hint):
+def test_class_that_is_no_metric_is_refused(kind, hint):
     with pytest.raises(BadInput, match=rf"^s.toml: metrics\.0: .*{hint}"):
         custom_metric_class(spec_of(kind), "s.toml", "metrics.0")
 
@@ -234,7 +234,7 @@ def test_a_class_that_is_no_metric_is_refused(kind, hint):
         *(("unit", 3), ("kind", "sum"), ("needs", ("range",)), ("bounds", (0.0,)), ("bounds", (0.0, "1"))),
     ],
 )
-def test_an_attribute_that_is_wrong_is_refused(monkeypatch, name, value):
+def test_custom_metric_with_a_wrong_attribute_is_refused(monkeypatch, name, value):
     monkeypatch.setattr(Good, name, value)
     with pytest.raises(BadInput) as refused:
         custom_metric_class(spec_of(Good), "s.toml", "metrics.0")
@@ -243,7 +243,7 @@ def test_an_attribute_that_is_wrong_is_refused(monkeypatch, name, value):
 
 
 @pytest.mark.parametrize(("kind", "said"), [(BeginsBadly, "no start"), (Wide, "could not broadcast")])
-def test_one_that_fails_is_named(kind, said):
+def test_custom_metric_that_fails_is_named(kind, said):
     with pytest.raises(CustomCodeFailed, match=rf"mine \({kind.__name__}\)[\s\S]*{said}"):
         _measure(kind())
 

@@ -34,7 +34,7 @@ def test_distances_between_senders_and_receivers_are_the_shortest():
     assert np.hypot(*shortest_displacement(at[0] - at[1], TORUS).T) == pytest.approx(expected)
 
 
-def test_a_link_across_the_seam_is_drawn_from_both_ends_and_of_the_shortest_length():
+def test_link_across_the_seam_is_drawn_shortest_from_both_ends():
     position = np.array([(3.9, 0.0), (-3.9, 0.2), (3.0, 0.0)])
     lines = link_lines(position, np.array([(0, 1), (0, 2)]), TORUS)
     assert np.allclose(lines, [[(3.9, 0.0), (4.1, 0.2)], [(3.9, 0.0), (3.0, 0.0)], [(-4.1, 0.0), (-3.9, 0.2)]])
@@ -43,7 +43,7 @@ def test_a_link_across_the_seam_is_drawn_from_both_ends_and_of_the_shortest_leng
     assert link_lines(position, np.empty((0, 2), np.int64), TORUS).shape == (0, 2, 2)
 
 
-def test_a_path_over_the_seam_has_no_jumps_and_ends_where_it_did():
+def test_path_across_the_seam_has_no_jumps_and_keeps_its_end():
     place = np.array([[(3.7, 2.9)], [(3.9, -3.0)], [(-3.9, -2.9)]], np.float32)
     assert np.allclose(unwrap_path(place, TORUS), [[(-4.3, -3.1)], [(-4.1, -3.0)], [(-3.9, -2.9)]], atol=1e-6)
     assert unwrap_path(place, replace(TORUS, boundary="walls")) is place

@@ -23,7 +23,7 @@ def rewritten(folder, **changes):
     return folder
 
 
-def test_a_finished_campaign_has_every_run_in_order(tmp_path):
+def test_campaign_that_is_finished_has_every_run_in_order(tmp_path):
     campaign = CampaignFolder(write_campaign(tmp_path / "a", seeds=(7, 3, 5)))
     assert campaign.finished
     assert campaign.missing == ()
@@ -33,7 +33,7 @@ def test_a_finished_campaign_has_every_run_in_order(tmp_path):
     assert campaign.sample("order", 1).seed.tolist() == [7, 3, 5]
 
 
-def test_the_values_of_a_parameter_may_be_tables(tmp_path):
+def test_parameter_values_of_a_campaign_may_be_tables(tmp_path):
     params = [{"gain": 1.0, "blocked": True}, {"gain": 2.0, "blocked": False}]
     folder = write_campaign(tmp_path / "a", {"robots.flock.params": params})
     assert [point["robots.flock.params"] for point in CampaignFolder(folder).points] == params
@@ -91,7 +91,7 @@ def test_rows_of_a_campaign_that_was_taken_up_again_replace_those_of_before(tmp_
     assert CampaignFolder(folder).sample("order", 0).failed == 0
 
 
-def test_a_file_that_is_being_written_is_not_read(tmp_path):
+def test_file_that_is_still_being_written_is_not_read(tmp_path):
     folder = write_campaign(tmp_path / "a", parts=1)
     (folder / "parts" / ".aside-part-000001.parquet").write_text("half of a file")
     assert CampaignFolder(folder).finished
@@ -102,7 +102,7 @@ def test_failed_runs_are_counted_and_have_no_value(tmp_path):
     assert (len(sample), sample.failed, sample.seed.tolist()) == (8, 2, [1, *range(4, 11)])
 
 
-def test_a_time_that_never_came_is_censored_where_its_run_ended(tmp_path):
+def test_time_that_never_came_is_censored_where_its_run_ended(tmp_path):
     times = {"never_s": lambda *_: None, "soon_s": lambda *_: 3.0}
     campaign = CampaignFolder(write_campaign(tmp_path / "a", times=times, limit_s=40.0))
     never, soon = campaign.sample("never_s", 0), campaign.sample("soon_s", 0)
@@ -120,7 +120,7 @@ def test_runs_that_a_stop_condition_ended_before_the_time_are_counted(tmp_path):
     assert not len(stop.stopped_first)  # of itself it is the end of the run
 
 
-def test_a_number_that_was_not_to_be_measured_is_undefined(tmp_path):
+def test_number_without_a_value_is_undefined_in_a_sample(tmp_path):
     numbers = {"gap_m.final": lambda _, rng: None if rng.random() < 0.5 else 1.0}
     sample = CampaignFolder(write_campaign(tmp_path / "a", numbers=numbers)).sample("gap_m", 0)
     assert 0 < sample.undefined < 10
@@ -145,7 +145,7 @@ def test_statistics_go_by_column_and_stat(tmp_path, name, means):
 
 
 @pytest.mark.parametrize("stat", get_args(Stat))
-def test_a_time_has_every_statistic(tmp_path, stat):
+def test_time_response_has_every_statistic(tmp_path, stat):
     found = CampaignFolder(write_campaign(tmp_path / "a")).statistic(f"aggregation_time_s.{stat}")
     assert (found.response.kind, found.stat) == ("time", stat)
 
@@ -154,14 +154,14 @@ def test_a_time_has_every_statistic(tmp_path, stat):
     ("name", "hint"),
     [("ordre.final", "order.final (did you"), ("order.q51", ""), ("order.censored", "time"), ("", ""), (".q50", "")],
 )
-def test_a_statistic_that_there_is_not_is_refused(tmp_path, name, hint):
+def test_unknown_statistic_is_refused(tmp_path, name, hint):
     campaign = CampaignFolder(write_campaign(tmp_path / "a"))
     with pytest.raises(BadInput, check=lambda error: error.key == name and hint in error.expected):
         campaign.statistic(name)
 
 
 @pytest.mark.parametrize("point", [-1, 3])
-def test_a_point_that_there_is_not_is_refused(tmp_path, point):
+def test_unknown_point_is_refused(tmp_path, point):
     with pytest.raises(BadInput, check=lambda error: error.key == "point"):
         CampaignFolder(write_campaign(tmp_path / "a")).sample("order", point)
 
@@ -187,14 +187,14 @@ def test_a_point_that_there_is_not_is_refused(tmp_path, point):
         ({"name": None}, "name"),
     ],
 )
-def test_a_damaged_or_foreign_campaign_is_refused_with_its_key(tmp_path, changes, key):
+def test_damaged_campaign_json_is_refused_with_file_and_key(tmp_path, changes, key):
     folder = rewritten(write_campaign(tmp_path / "a"), **changes)
     with pytest.raises(BadInput) as refused:
         CampaignFolder(folder)
     assert (refused.value.where, refused.value.key) == (str(folder / "campaign.json"), key)
 
 
-def test_what_is_no_campaign_is_refused(tmp_path):
+def test_folder_without_a_campaign_is_refused(tmp_path):
     with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "nothing")):
         CampaignFolder(tmp_path / "nothing")
     with pytest.raises(BadInput, check=lambda error: (error.where, error.key) == (str(tmp_path), "campaign.json")):
@@ -205,7 +205,7 @@ def test_what_is_no_campaign_is_refused(tmp_path):
             CampaignFolder(tmp_path)
 
 
-def test_a_damaged_table_is_refused_when_it_is_read(tmp_path):
+def test_damaged_table_of_a_campaign_is_refused_when_it_is_read(tmp_path):
     folder = write_campaign(tmp_path / "a")
     (folder / "summary.parquet").write_text("no table")
     with pytest.raises(BadInput, check=lambda error: error.where == str(folder / "summary.parquet")):
@@ -215,7 +215,7 @@ def test_a_damaged_table_is_refused_when_it_is_read(tmp_path):
         _ = CampaignFolder(folder).runs
 
 
-def test_a_time_that_must_hold_is_watched_for_so_much_less_than_the_run(tmp_path):
+def test_hold_of_a_time_response_shortens_its_observation_in_a_sample(tmp_path):
     folder = write_campaign(tmp_path / "a")
     responses = json.loads((folder / "campaign.json").read_text())["responses"]
     held = [of | {"hold_s": 5.0} if of["column"] == "aggregation_time_s" else of for of in responses]
@@ -266,7 +266,7 @@ def test_times_and_last_values_are_compared_unless_others_are_named(plain, bette
     ] * 2
 
 
-def test_what_neither_has_a_value_of_is_left_out_unless_named(tmp_path, plain):
+def test_response_without_values_is_compared_only_if_named(tmp_path, plain):
     folders = [
         write_campaign(tmp_path / name, numbers=NUMBERS | {"gap_m.final": lambda *_: None}, seeds=(1, 2))
         for name in "ab"
@@ -279,7 +279,7 @@ def test_what_neither_has_a_value_of_is_left_out_unless_named(tmp_path, plain):
         compared(none, none)
 
 
-def test_two_parts_of_one_campaign_meet_where_they_were_chosen(plain):
+def test_selected_points_of_one_campaign_are_compared(plain):
     found = compared(f"{plain}@radio.loss=0", f"{plain}@radio.loss=0.4", "order.final")
     assert found.paths == ()
     (row,) = found.rows
@@ -288,7 +288,7 @@ def test_two_parts_of_one_campaign_meet_where_they_were_chosen(plain):
     assert cells(found, row)[1] == "A: radio.loss=0; B: radio.loss=0.4"
 
 
-def test_what_only_one_varies_is_told_beside_it(tmp_path, plain):
+def test_parameter_that_one_campaign_alone_varies_stands_in_its_label(tmp_path, plain):
     both = write_campaign(tmp_path / "both", TWO)
     found = compared(both, f"{plain}@radio.loss=0", "order")
     assert cells(found, found.rows[0])[1] == "A: radio.loss=0, physics.engine=discs; B: radio.loss=0"
@@ -306,7 +306,7 @@ def test_campaigns_that_vary_nothing_have_one_point(tmp_path):
     assert [cells(found, row)[1] for row in found.rows] == ["all"]
 
 
-def test_the_table_says_how_many_failed_are_missing_and_what_it_shows(tmp_path, plain):
+def test_comparison_notes_count_runs_failed_and_missing(tmp_path, plain):
     part = write_campaign(tmp_path / "part", failed=(0, 1), missing=(25,), parts=1)
     found = compared(plain, part)
     told = "\n".join(notes(found))
@@ -328,7 +328,7 @@ def test_times_of_runs_that_a_stop_condition_ended_are_warned_of(tmp_path, plain
     assert not [line for line in notes(compared(plain, plain)) if "[stop]" in line]
 
 
-def test_of_a_discrete_outcome_the_means_are_compared(tmp_path):
+def test_discrete_outcomes_are_compared_by_their_means(tmp_path):
     one, other = (
         write_campaign(tmp_path / str(share), numbers={"groups.final": lambda _, rng, p=share: float(rng.random() < p)})
         for share in (0.1, 0.4)
@@ -371,7 +371,7 @@ def test_samples_without_a_seed_in_common_are_said_to_be(tmp_path, plain):
     assert [row.difference.test for row in found.rows] == ["log-rank", "Mann-Whitney"]
 
 
-def test_the_table_for_programs_has_the_numbers_of_the_rows(tmp_path, plain, better):
+def test_comparison_csv_has_the_numbers_of_the_rows(tmp_path, plain, better):
     never = write_campaign(tmp_path / "never", times={"aggregation_time_s": lambda *_: None})
     found = compared(never, better)
     write_comparison(found, tmp_path / "x.csv")
@@ -387,12 +387,12 @@ def test_the_table_for_programs_has_the_numbers_of_the_rows(tmp_path, plain, bet
 
 
 @pytest.mark.parametrize("name", ["x.txt", "nowhere/x.csv"])
-def test_a_path_that_takes_no_table_is_refused(tmp_path, plain, name):
+def test_path_that_takes_no_table_is_refused_for_a_comparison(tmp_path, plain, name):
     with pytest.raises(BadInput):
         write_comparison(compared(plain, plain), tmp_path / name)
 
 
-def test_a_folder_whose_name_has_an_at_is_a_folder(tmp_path):
+def test_folder_with_an_at_sign_in_its_name_is_selected(tmp_path):
     folder = write_campaign(tmp_path / "a@b=c")
     assert len(select(str(folder)).points) == 3
 
@@ -410,7 +410,7 @@ def test_a_folder_whose_name_has_an_at_is_a_folder(tmp_path):
         ("plain@radio.loss=", "plain", "radio.loss=", "="),
     ],
 )
-def test_what_cannot_be_compared_is_refused_with_its_key(tmp_path, plain, first, second, key, hint):
+def test_campaigns_that_cannot_be_compared_are_refused_with_key(tmp_path, plain, first, second, key, hint):
     write_campaign(tmp_path / "other", {"physics.engine": ["discs", "pymunk"]})
     write_campaign(tmp_path / "far", {"radio.loss": [0.9]})
     write_campaign(tmp_path / "strange", numbers={"gap_m.final": lambda *_: 1.0}, times={})

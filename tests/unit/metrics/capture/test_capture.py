@@ -24,7 +24,7 @@ def table(*rows: dict[str, object]) -> pl.DataFrame:
     return pl.DataFrame(whole, schema=PacketsTable.types)
 
 
-def test_a_packet_is_one_frame_with_the_fate_at_each_receiver():
+def test_packet_is_one_frame_with_its_fate_at_each_receiver():
     one = {"on_air_at_ns": 70, "payload": b"told"}
     seen = table(
         {**one, "receiver": 2, "fate": "collided", "rssi_dbm": -80.0},
@@ -72,7 +72,7 @@ def test_ieee_802_15_4_has_a_tap_header_and_short_addresses():
 
 
 @pytest.mark.parametrize(("frequency_hz", "channel"), [(2.405e9, "0b00"), (2.480e9, "1a00"), (868.3e6, None)])
-def test_the_channel_is_told_where_the_band_has_channels(frequency_hz: float, channel: str | None):
+def test_channel_is_written_only_for_bands_that_have_channels(frequency_hz: float, channel: str | None):
     found = header(radio_of({"preset": "ieee802154", "frequency_hz": frequency_hz}))
     if channel is None:
         assert found.startswith(joined("00 00 1400", FCS_NONE, RATE, "4188"))
@@ -94,7 +94,7 @@ def test_ieee_802_11_has_a_radiotap_header_and_udp():
 
 
 @pytest.mark.parametrize(("preset", "duration_us"), [("wifi-b-1M", 10 + 192 + 112), ("wifi-a-6M", 16 + 44)])
-def test_an_addressed_frame_keeps_the_air_for_its_acknowledgement(preset: str, duration_us: int):
+def test_addressed_wifi_frame_reserves_the_air_for_its_acknowledgement(preset: str, duration_us: int):
     found = bytes.fromhex(header(radio_of({"preset": preset}), to=2))
     assert found[14:24] == struct.pack("<HH", 8, duration_us) + bytes.fromhex("025357000003")
     words = struct.unpack(">10H", found[14 + 24 + 8 :][:20])
@@ -128,7 +128,7 @@ def test_llc_of_frames_with_a_length_stays_and_types_stand_behind_snap(content: 
     assert captured.hex().partition(to_llc)[2] == expected
 
 
-def test_a_radio_without_a_standard_has_a_plain_header():
+def test_radio_without_a_standard_has_a_plain_header():
     for preset in ("unit-disk", "kilobot", "ble-1M", "gz-rfcomms", "acoustic"):
         radio = radio_of({"preset": preset})
         assert link_of(radio).link_type == 147
@@ -156,7 +156,7 @@ PACKETS = st.lists(
 
 
 @given(PACKETS)
-def test_what_was_written_is_read_back(tmp_path_factory, packets: list[Captured]):
+def test_capture_is_read_back_as_written(tmp_path_factory, packets: list[Captured]):
     path = tmp_path_factory.mktemp("capture") / "some.pcapng"
     blocks = [packet(one.at_ns, one.data, one.length, one.comments) for one in packets]
     path.write_bytes(section("s") + interface(147, "n", "d") + b"".join(blocks))
@@ -165,7 +165,7 @@ def test_what_was_written_is_read_back(tmp_path_factory, packets: list[Captured]
     assert (found.link_type, found.packets) == (147, packets)
 
 
-def test_a_comment_too_long_for_an_option_is_cut_between_characters(tmp_path):
+def test_comment_too_long_for_an_option_is_cut_between_characters(tmp_path):
     path = tmp_path / "long.pcapng"
     path.write_bytes(section("s") + interface(147, "n", "d") + packet(0, b"", 0, ["é" * 40_000, "next"]))
     assert read(path).packets[0].comments == ["é" * 32_767, "next"]

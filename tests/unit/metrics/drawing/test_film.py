@@ -11,7 +11,7 @@ from swarmwire.metrics.pictures.drawing.film import MAX_BY_DEFAULT, NO_STATE, fi
 from tests.support.metrics.films import Folder, film, ticks_frame, two_groups
 
 
-def test_a_film_holds_what_the_run_folder_does(tmp_path):
+def test_film_holds_what_the_run_folder_does(tmp_path):
     of = film()
     ticks_frame(of).write_parquet(tmp_path / "ticks.parquet")
     read = film_of(Folder(tmp_path), 0, "run")
@@ -23,7 +23,7 @@ def test_a_film_holds_what_the_run_folder_does(tmp_path):
     assert (read.state, read.state_names) == (None, ())
 
 
-def test_the_parts_of_a_run_that_was_killed_are_put_together_in_order(tmp_path):
+def test_parts_of_a_killed_run_are_joined_in_order_in_a_film(tmp_path):
     of = film()
     (tmp_path / "ticks").mkdir()
     for name, rows in (("part-1", slice(20, 31)), ("part-0", slice(0, 20))):
@@ -31,7 +31,7 @@ def test_the_parts_of_a_run_that_was_killed_are_put_together_in_order(tmp_path):
     np.testing.assert_array_equal(film_of(Folder(tmp_path), 0, "run").pose, of.pose)
 
 
-def test_a_film_is_of_one_arena(tmp_path):
+def test_film_is_of_one_arena(tmp_path):
     of, moved = film(), film(pose=film().pose + 1)
     both = pl.concat([ticks_frame(of), ticks_frame(moved, arena=1)])
     both.write_parquet(tmp_path / "ticks.parquet")
@@ -41,7 +41,7 @@ def test_a_film_is_of_one_arena(tmp_path):
         film_of(folder, 2, "run")
 
 
-def test_a_run_without_a_tick_yet_is_refused():
+def test_run_without_a_tick_makes_no_film():
     empty = SimpleNamespace(static=two_groups(), measured={}, ticks=lambda _: ticks_frame(film())[:0])
     with pytest.raises(BadInput, check=lambda error: error.where == "run"):
         film_of(empty, 0, "run")
@@ -59,7 +59,7 @@ def test_there_are_no_states_where_no_robot_noted_any():
     assert states(ticks_frame(film(ticks=2), states=[["", "", None]] * 2)) == ((), None)
 
 
-def test_the_tick_of_a_time_is_the_last_that_had_begun():
+def test_tick_at_a_time_is_the_last_that_had_begun():
     of = film()
     assert [of.index_at(time_s) for time_s in (0.0, 0.05, 0.1, 0.3, 2.99, 99.0)] == [0, 0, 1, 3, 29, 30]
 
@@ -95,7 +95,7 @@ def cut(time_s=TIME_S, rate_hz=10, **given):
 
 
 @pytest.mark.parametrize(("duration_s", "speed"), [(20, 1), (30, 1), (31, 2), (60, 2), (120, 4), (3000, 100)])
-def test_a_film_is_as_slow_as_its_usual_length_allows(duration_s, speed):
+def test_film_speed_grows_until_the_film_is_short_enough(duration_s, speed):
     found = cut(np.arange(duration_s * 10) / 10)
     assert found.speed == speed
     assert MAX_BY_DEFAULT / 2 <= len(found.ticks) <= MAX_BY_DEFAULT
@@ -113,7 +113,7 @@ def test_speed_and_frames_per_second_say_which_ticks_are_shown():
     assert found.ticks.tolist() == list(range(100, 201, 4))
 
 
-def test_one_tick_is_a_film_of_one_frame():
+def test_single_tick_is_a_film_of_one_frame():
     assert cut(TIME_S[:1]).ticks.tolist() == [0]
 
 
@@ -129,6 +129,6 @@ def test_one_tick_is_a_film_of_one_frame():
         ({"speed": 0.001}, "--speed", "1200001"),
     ],
 )
-def test_what_is_no_film_is_refused(given, option, number):
+def test_options_that_cut_no_film_are_refused(given, option, number):
     with pytest.raises(BadInput, check=lambda error: error.where == option and number in error.expected):
         cut(frames_per_s=10.0, **given) if "speed" in given else cut(**given)

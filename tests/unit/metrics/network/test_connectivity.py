@@ -25,7 +25,7 @@ def components(of, **given_fields):
     return measured("components", of, seen), measured("largest_component", of, seen)
 
 
-def test_a_split_swarm_counts_its_pieces_and_the_share_of_the_largest():
+def test_split_swarm_has_its_pieces_and_the_share_of_the_largest():
     assert components(static(8), edges=edges((0, 1), (1, 2), (3, 4), (4, 5), (5, 6))) == ([3.0], [0.5])
 
 
@@ -93,7 +93,7 @@ def test_connectivity_is_that_of_each_arenas_robots_alive(drawn):
     )
 
 
-def test_of_a_large_swarm_both_ways_find_the_same_connectivity():
+def test_connectivity_of_a_large_swarm_is_the_same_dense_and_sparse():
     of, rng = static(130), np.random.default_rng(4)
     place = rng.uniform(0, np.sqrt(130), (130, 2))
     near = np.argwhere(np.hypot(*(place[:, None] - place[None]).transpose(2, 0, 1)) < 2.0)
@@ -104,7 +104,7 @@ def test_of_a_large_swarm_both_ways_find_the_same_connectivity():
     assert found > 0.01
 
 
-def test_it_is_sampled_and_held():
+def test_connectivity_is_held_between_its_samples():
     of = static(3)
     ticks = (truth(of, tick, edges=edges((0, 1), (1, 2)) if tick < 1 else edges()) for tick in range(4))
     assert in_each_tick(of, ticks, AlgebraicConnectivity(every_s=0.2)).ravel().tolist() == [1.0, 1.0, 0.0, 0.0]
@@ -148,7 +148,7 @@ def test_articulation_points_are_those_without_which_there_are_more_pieces(drawn
     assert points(static(8, arenas=len(arenas)), pairs) == expected
 
 
-def test_of_a_large_swarm_articulation_points_are_those_that_networkx_finds():
+def test_articulation_points_of_a_large_swarm_are_those_of_networkx():
     for seed, reach in ((1, 1.0), (2, 1.2), (3, 1.4)):
         at = np.random.default_rng(seed).uniform(0, 20, (400, 2))
         pairs = np.argwhere(np.triu(np.hypot(*(at[:, None] - at[None]).transpose(2, 0, 1)) < reach, 1))

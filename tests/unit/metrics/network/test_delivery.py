@@ -65,7 +65,7 @@ def test_latency_on_air_ends_at_hearing_and_to_the_agent_at_the_tick_that_hands_
     assert found["latency_agent_s"] == {p: pytest.approx(0.06, rel=0.005) for p in ("p50", "p90", "p99")}
 
 
-def test_only_received_packets_have_a_latency():
+def test_latency_is_null_where_no_packet_was_received():
     lost = finished([0], [50_000_000], fate=Fate.LOST)
     [found] = tallied(static(), {"tally": tally({Fate.LOST: 1}), "finished": lost})
     assert found["latency_air_s"] == {"p50": None, "p90": None, "p99": None}
@@ -78,13 +78,13 @@ def test_without_a_radio_the_summary_has_no_part_of_it():
     assert observer.end(None) == {}
 
 
-def test_the_summary_is_plain_json():
+def test_delivery_summary_is_plain_json():
     found = tallied(static(), {"tally": tally({Fate.RECEIVED: 2}), "finished": finished([0, 0], [5, 7])})
     assert json.loads(json.dumps(found, allow_nan=False)) == found
 
 
 @given(st.lists(st.lists(st.integers(0, 9), min_size=len(Fate), max_size=len(Fate)), max_size=5))
-def test_what_the_ticks_counted_is_what_the_run_counted(ticks):
+def test_fates_of_a_run_are_the_sums_over_its_ticks(ticks):
     table = np.array(ticks, np.int64).reshape(-1, len(Fate))
     seen = [{"tally": tally(dict(zip(Fate, row, strict=True)))} for row in ticks]
     [found] = tallied(static(), *seen, last=tally({}))
@@ -92,7 +92,7 @@ def test_what_the_ticks_counted_is_what_the_run_counted(ticks):
     assert sum(found["fates"].values()) == found["intended"]
 
 
-def test_a_robot_has_what_became_of_its_packets_and_of_those_meant_for_it():
+def test_robot_counts_cover_packets_it_sent_and_those_meant_for_it():
     counts = RobotCounts(static(3, arenas=2))
     refused = links([2], [-1], 4, 0, fate=Fate.QUEUE_FULL, receivers=2, arena=1)
     counts.add(departed([2], intended=2, fate=Fate.QUEUE_FULL, arena=1), refused)
@@ -111,7 +111,7 @@ def test_a_robot_has_what_became_of_its_packets_and_of_those_meant_for_it():
     assert counts.received_bytes.tolist() == [0, 0, 0, 0, ended.size_bytes[0], 0]
 
 
-def test_a_link_has_a_row_for_each_fate_that_occurred_on_it():
+def test_link_counts_have_a_row_for_each_fate_that_occurred():
     counts = LinkCounts(static(3, arenas=2))
     counts.add(links([2, 0, 2], [1, 1, 1], [1, 1, 2], 0, fate=[Fate.RECEIVED, Fate.LOST, Fate.RECEIVED]))
     counts.add(links([2, 2], [1, -1], [3, 4], 0, fate=[Fate.LOST, Fate.QUEUE_FULL], arena=1))
@@ -175,7 +175,7 @@ def test_airtime_is_the_share_of_the_tick_that_a_robot_alive_is_on_air():
     assert measured("airtime", of, truth(of, departed=two, alive=dead))[1] == pytest.approx(10 / (2 * TICK_MS))
 
 
-def test_of_a_packet_longer_than_a_tick_the_rest_counts_in_those_that_follow():
+def test_airtime_of_a_long_packet_is_spread_over_its_ticks():
     of, senders = static(2), ([0], [1], [], [])
     gone = (departed(sender, off_air_at_ns=(250 - 200 * tick) * MS) for tick, sender in enumerate(senders))
     found = in_each_tick(of, (truth(of, tick, departed=one) for tick, one in enumerate(gone)), "airtime").ravel()
@@ -189,7 +189,7 @@ def test_throughput_counts_payload_once_for_each_that_received_it():
     assert measured("throughput", of, truth(of, finished=told)) == [2 * 12 * 8 * 10.0, 0.0]
 
 
-def test_of_robots_that_all_send_each_tick_they_are_what_the_radio_says():
+def test_airtime_and_throughput_of_steady_senders_match_the_radio():
     """Airtime 8 x bytes x rate / bit rate; throughput n (n - 1) (1 - p) x 8 x bytes x rate, within 3 %: 5 deviations.
 
     A packet that goes on air late in a tick counts in the next: of 30 packets of a robot that moves at most one.

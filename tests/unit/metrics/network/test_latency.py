@@ -36,7 +36,7 @@ def told(of, seen, window_s):
 
 
 @given(st.lists(st.integers(-9, 9), max_size=30), st.integers(1, 8))
-def test_a_window_holds_the_last_ticks(numbers, size):
+def test_window_holds_the_last_ticks(numbers, size):
     of = static(1, arenas=2)
     window = Window(of, size / of.rate_hz, 1)
     for tick, number in enumerate(numbers):
@@ -44,13 +44,13 @@ def test_a_window_holds_the_last_ticks(numbers, size):
         assert window.add([[number, 2 * number]]).tolist() == [[sum(own), 2 * sum(own)]]
 
 
-def test_a_window_is_rounded_up_to_whole_ticks():
+def test_window_is_rounded_up_to_whole_ticks():
     for window_s, size in ((0.01, 1), (0.1, 1), (0.11, 2), (0.3, 3), (0.7, 7)):
         window = Window(static(1), window_s, 1)
         assert [int(window.add([[1]])[0, 0]) for _ in range(9)][-1] == size
 
 
-def test_the_ratios_are_of_intended_receivers_and_of_those_in_range_of_the_window_alone():
+def test_ratios_count_intended_and_in_range_receivers_of_the_window_alone():
     of = static(arenas=2)
     counts = [
         tally({Fate.RECEIVED: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9}, {Fate.OUT_OF_RANGE: 2}),
@@ -78,7 +78,7 @@ def test_latencies_end_at_hearing_and_at_the_tick_in_which_the_receiver_acts():
 
 @settings(max_examples=25)
 @given(radio_runs(), st.integers(1, 5), st.integers(1, 3))
-def test_they_are_sums_over_the_packets_of_the_window(run, size, every):
+def test_ratios_and_latencies_are_sums_over_packets_of_the_window(run, size, every):
     drawn, seen = run
     of = replace(drawn, groups=(replace(drawn.groups[0], act_every_ticks=every),))
     found = told(of, seen, window_s=size * 0.1)
@@ -108,7 +108,7 @@ LOSSES = 0.3
 OPEN = Radio(range_m=50.0, loss=LOSSES, latency_s=0.15, jitter_s=0.1)
 
 
-def test_of_independent_losses_the_ratio_is_what_is_not_lost_and_the_latency_that_of_the_radio():
+def test_ratio_and_latency_under_independent_losses_match_the_radio():
     """Of 15000 links the ratio deviates by 0.004, the mean of the jitter by 0.0003 s: five times that is let pass."""
     of = static(20, arenas=4)
     air = make_medium(OPEN, of.robots, of.seeds, [()] * of.arenas)
@@ -157,7 +157,7 @@ def received_at(sent_at_ms, final_at_ms):
     return replace(links_received([0] * len(sent_at_ms), [1] * len(sent_at_ms), sent_at_ms), **columns)
 
 
-def test_a_peak_is_the_age_just_before_a_newer_packet_came():
+def test_peak_age_is_the_age_just_before_a_newer_packet_came():
     of = static(2)
     told = [
         received_at([30], [60]),  # the first: no peak
@@ -170,7 +170,7 @@ def test_a_peak_is_the_age_just_before_a_newer_packet_came():
     assert found.ravel().tolist() == [pytest.approx(value, nan_ok=True) for value in (np.nan, 0.14, 0.14, 0.16)]
 
 
-def test_a_pair_that_went_out_of_reach_ages_on():
+def test_pair_out_of_reach_ages_on():
     of, nothing = static(2), links_received([], [], [])
     apart = np.array([(0.0, 0.0, 0.0), (7.0, 0.0, 0.0)])  # the range is 2 m
     seen = [truth(of, 1, finished=links_received([0], [1], [50]))]
@@ -178,7 +178,7 @@ def test_a_pair_that_went_out_of_reach_ages_on():
     assert ages(of, seen).ravel().tolist() == [pytest.approx(value) for value in (0.05, 0.15, 0.25)]
 
 
-def test_what_was_overtaken_or_lost_changes_nothing_and_several_at_once_count_once():
+def test_overtaken_and_lost_packets_leave_the_age_unchanged():
     of = static(2)
     told = [
         links_received([0, 0, 0], [1, 1, 1], [40, 80, 50]),
@@ -200,14 +200,14 @@ def test_pairs_with_a_dead_robot_do_not_count_until_it_lives_again():
     assert ages(of, seen).ravel().tolist() == [pytest.approx(value) for value in (0.055, 0.12, 0.22, 0.86 / 3)]
 
 
-def test_of_many_robots_every_nth_counts_as_a_receiver(monkeypatch):
+def test_receivers_are_thinned_in_the_age_of_large_swarms(monkeypatch):
     monkeypatch.setattr(age_of_information, "MAX_PAIRS", 20)  # 6 x 6 / 20: every second
     of = static(6)
     told = links_received([0, 0, 0], [1, 2, 4], [90, 80, 60])
     assert ages(of, [truth(of, 1, finished=told)]).ravel().tolist() == [pytest.approx(0.03)]
 
 
-def test_a_run_so_long_that_times_add_up_beyond_64_bits_has_its_mean():
+def test_age_sums_beyond_64_bits_have_the_right_mean():
     of, long_ns = static(4), 10**18
     pairs = [(a, b) for a in range(4) for b in range(4) if a != b]
     told = [links_received(*np.transpose(some), [long_ns // MS] * 6) for some in (pairs[:6], pairs[6:])]
@@ -244,7 +244,7 @@ def test_age_is_that_of_a_dictionary_of_what_each_has_received(run):
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.3, 0.6])
-def test_of_independent_losses_age_is_what_the_renewals_say(lost):
+def test_age_under_independent_losses_is_that_of_renewal_theory(lost):
     """Mean d + T (1 + p) / (2 (1 - p)): of 40,000 periods it deviates by a hundredth at most."""
     rng, arenas, periods, delay_ms, period_ms = np.random.default_rng(3), 100, 400, 50, 300
     of, seen = static(2, arenas=arenas), []
@@ -280,9 +280,9 @@ def test_percentiles_of_many_latencies_are_numpys_within_the_stated_error():
     np.testing.assert_allclose(percentiles_ns(durations_ns), exact, rtol=RELATIVE_ERROR)
 
 
-def test_nothing_has_no_percentile():
+def test_percentiles_of_no_latencies_are_nan():
     assert np.isnan(percentiles_ns([])).all()
 
 
-def test_what_is_longer_than_the_largest_counts_as_the_largest():
+def test_latency_beyond_the_largest_counts_as_the_largest():
     assert percentiles_ns([10 * LARGEST_NS])[1] == pytest.approx(LARGEST_NS, rel=RELATIVE_ERROR)

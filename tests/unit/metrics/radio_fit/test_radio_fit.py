@@ -90,7 +90,7 @@ def test_packets_lost_at_an_unknown_distance_were_where_the_last_known_was(tmp_p
         (POSITIONS, ["0,a,b,1,-50,2,3,2,3"], "row 1, rx_x_m"),
     ],
 )
-def test_what_cannot_be_is_refused_by_row_and_column(tmp_path, head, rows, key):
+def test_log_of_packets_that_is_invalid_is_refused_with_row_and_column(tmp_path, head, rows, key):
     file = log(tmp_path, *rows, head=head)
     with pytest.raises(BadInput) as error:
         read_log(file)
@@ -100,7 +100,7 @@ def test_what_cannot_be_is_refused_by_row_and_column(tmp_path, head, rows, key):
 @pytest.mark.parametrize(
     ("name", "text"), [("log.xls", ""), ("absent.csv", None), ("empty.csv", ""), ("log.parquet", "no parquet")]
 )
-def test_what_is_no_table_is_refused_in_one_line(tmp_path, name, text):
+def test_file_that_is_no_table_is_refused_in_one_line_by_a_fit(tmp_path, name, text):
     if text is not None:
         (tmp_path / name).write_text(text)
     with pytest.raises(BadInput) as error:
@@ -119,7 +119,7 @@ def made(delays: Delays, constant_s: float = 0.0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("distribution", ["normal", "lognormal", "pareto"])
-def test_each_distribution_is_told_from_the_others_and_found_again(distribution):
+def test_delay_distributions_are_identified_and_their_parameters_recovered(distribution):
     of = fit_latency(made(Delays(distribution, 0.02, 0.006)))
     assert isinstance(of, LatencyFit)
     assert of.delays is not None
@@ -131,7 +131,7 @@ def test_each_distribution_is_told_from_the_others_and_found_again(distribution)
     assert 0.0 < of.delays.mean_s.standard_error < 0.004
 
 
-def test_a_constant_below_a_skewed_delay_is_found_again():
+def test_constant_below_a_skewed_delay_is_recovered():
     of = fit_delays(made(Delays("lognormal", 0.01, 0.01), constant_s=0.05))
     assert of is not None
     assert of.distribution == "lognormal"
@@ -157,7 +157,7 @@ def test_uniform_delays_stay_uniform():
     assert of.delays is None
 
 
-def test_a_few_very_late_packets_do_not_make_another_distribution():
+def test_few_very_late_packets_make_no_other_distribution():
     latency_s = made(Delays("uniform", 0.02, 0.005))
     latency_s[::40] += 2.0
     of = fit_latency(latency_s)

@@ -70,7 +70,7 @@ def by_robots(folder):
     return folder
 
 
-def test_what_robots_write_is_read_back(folders):
+def test_logs_that_robots_write_are_read_back(folders):
     logs = read_real_logs(folders[0])
     assert logs.notes == ()
     assert logs.names == flock().static.robot_names
@@ -85,7 +85,7 @@ def test_what_robots_write_is_read_back(folders):
     assert logs.robots[0].ended == "stopped"
 
 
-def test_it_is_measured_as_what_tests_write(folders):
+def test_logs_that_robots_write_measure_as_those_that_tests_write(folders):
     by_robots_, by_tests = (measured_log(read_real_logs(folder), MEASURES, flock().static) for folder in folders)
     for name, series in by_robots_.series.items():
         np.testing.assert_allclose(series, by_tests.series[name], rtol=1e-4, atol=1e-4, err_msg=name)

@@ -50,7 +50,7 @@ def test_everything_stands_in_the_page_once():
     check_alone(shown)
 
 
-def test_the_contents_lead_to_each_section():
+def test_contents_of_a_page_lead_to_each_section():
     assert report("Words.").fetched == ["#part-1", "#part-2"]
 
 
@@ -82,7 +82,7 @@ def test_columns_of_numbers_stand_at_the_right():
     assert text.count('<td class="number">') == 6
 
 
-def test_a_table_without_names_of_columns_has_no_head():
+def test_table_without_column_names_has_no_head():
     shown = report(ReportTable(("", ""), (("a", "b"),), ""))
     assert "thead" not in shown.tags
     assert shown.tables == [[["a", "b"]]]

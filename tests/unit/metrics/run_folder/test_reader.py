@@ -133,7 +133,7 @@ def test_pandas_gets_the_same(recorded):
     assert frame["x_m"].to_list() == folder.robots()["x_m"].to_list()
 
 
-def test_the_summary_is_there_once_the_run_has_ended(tmp_path):
+def test_summary_is_none_until_the_run_has_ended_and_refused_if_damaged(tmp_path):
     folder = RunFolder(tmp_path)
     assert folder.summary is None
     summary = made_up_summary(3)
@@ -161,7 +161,7 @@ def test_parts_that_are_joined_while_they_are_read_do_no_harm(recorded, monkeypa
     assert len(looks) == 2
 
 
-def test_what_is_not_there_is_named(tmp_path):
+def test_missing_folder_table_and_static_part_are_named(tmp_path):
     with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "nowhere")):
         RunFolder(tmp_path / "nowhere")
     with pytest.raises(BadInput, check=lambda error: error.key == "packets"):
@@ -170,7 +170,7 @@ def test_what_is_not_there_is_named(tmp_path):
         _ = RunFolder(tmp_path).static
 
 
-def test_of_a_killed_run_in_which_nothing_had_happened_the_events_are_none(tmp_path):
+def test_events_and_packets_of_a_killed_run_without_any_are_empty(tmp_path):
     of = static(2)
     (tmp_path / "ended").mkdir()
     record(tmp_path / "ended", of, wandering(of, 2), packets=1.0)
@@ -181,7 +181,7 @@ def test_of_a_killed_run_in_which_nothing_had_happened_the_events_are_none(tmp_p
         assert left.schema == ended.schema
 
 
-def test_a_damaged_table_and_an_arena_that_is_not_there_are_named(recorded):
+def test_damaged_table_and_unknown_arena_are_named(recorded):
     folder, _, _ = recorded
     with pytest.raises(BadInput, check=lambda error: error.key == "arena"):
         folder.robots(2)
@@ -191,7 +191,7 @@ def test_a_damaged_table_and_an_arena_that_is_not_there_are_named(recorded):
         folder.ticks()
 
 
-def test_the_summarys_part_leaves_out_what_was_not_recorded():
+def test_record_summary_leaves_out_tables_that_were_not_recorded():
     assert tables.record_summary({"metrics": [], "record_ticks": {"rows": 1}}) == {"ticks": {"rows": 1}}
 
 
@@ -245,7 +245,7 @@ def statics(draw):
 
 @given(statics())
 @settings(max_examples=40, deadline=None)
-def test_what_was_written_is_read_back_equal(tmp_path_factory, of):
+def test_static_part_is_read_back_equal(tmp_path_factory, of):
     path = tmp_path_factory.mktemp("run") / "static.json"
     write_static(of, path)
     assert read_static(path) == of
@@ -266,7 +266,7 @@ def test_what_was_written_is_read_back_equal(tmp_path_factory, of):
         ({"range_m": True}, "True"),
     ],
 )
-def test_what_is_no_static_is_refused(tmp_path, change, fault):
+def test_damaged_static_part_is_refused_with_its_fault(tmp_path, change, fault):
     path = tmp_path / "static.json"
     write_static(static(2), path)
     path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
@@ -275,7 +275,7 @@ def test_what_is_no_static_is_refused(tmp_path, change, fault):
 
 
 @pytest.mark.parametrize("text", [None, "", "[1]", "{", "\x00"])
-def test_what_is_no_json_object_of_ours_or_not_there_is_refused(tmp_path, text):
+def test_static_file_without_a_json_object_is_refused(tmp_path, text):
     path = tmp_path / "static.json"
     if text is not None:
         path.write_text(text)
@@ -287,7 +287,7 @@ OWN = MetricInfo("gas", "what it smells of", "ppm", "count", (0.0, None))
 
 
 @pytest.mark.parametrize("name", METRICS)
-def test_what_is_kept_of_a_metric_comes_back(tmp_path, name):
+def test_metric_facts_are_read_back_from_run_json(tmp_path, name):
     facts = metric_info(METRICS[name])
     run = {"format": 1, "metrics": [asdict(facts), asdict(OWN)]}
     (tmp_path / "run.json").write_text(json.dumps(run, allow_nan=False))
@@ -297,7 +297,7 @@ def test_what_is_kept_of_a_metric_comes_back(tmp_path, name):
 
 
 @pytest.mark.parametrize("metrics", ["", ', "metrics": 3', ', "metrics": [{"name": "gas"}]'])
-def test_of_a_damaged_list_nothing_is_known(tmp_path, metrics):
+def test_damaged_list_of_metrics_counts_as_none(tmp_path, metrics):
     (tmp_path / "run.json").write_text(f'{{"format": 1{metrics}}}')
     assert RunFolder(tmp_path).measured == {}
 
@@ -309,7 +309,7 @@ def test_without_a_readable_file_nothing_is_known(tmp_path, text):
     assert RunFolder(tmp_path).started == RunFolder(tmp_path).measured == {}
 
 
-def test_an_axis_is_that_of_what_the_metric_said():
+def test_axis_of_a_metric_follows_its_recorded_facts():
     facts = {"gas": OWN, "share": MetricInfo("share", "", "", "level", (0.0, 1.0))}
     assert (titled("gas", facts), titled("gas")) == ("gas (ppm)", "gas")
     assert (is_count("gas", facts), is_count("gas")) == (True, False)

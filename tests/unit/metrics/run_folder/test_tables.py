@@ -52,7 +52,7 @@ def check(table, of, seen):
 
 @given(ticks=st.integers(1, 25), arenas=st.integers(1, 3), robots=st.integers(1, 4), in_chunk=st.integers(1, 9))
 @settings(max_examples=15, deadline=None)
-def test_every_tick_comes_back_however_it_was_cut_into_parts(tmp_path_factory, ticks, arenas, robots, in_chunk):
+def test_ticks_come_back_however_they_were_cut_into_parts(tmp_path_factory, ticks, arenas, robots, in_chunk):
     folder, of = tmp_path_factory.mktemp("run"), static(robots, arenas=arenas)
     seen = list(wandering(of, ticks))
     with pytest.MonkeyPatch.context() as patch:
@@ -79,7 +79,7 @@ def test_metrics_are_those_measured_and_null_where_undefined(tmp_path):
     assert table["target_best"].null_count() == 24  # there is no light
 
 
-def test_the_radios_counts_are_those_of_the_tick_and_null_without_a_radio(tmp_path):
+def test_radio_counts_are_those_of_the_tick_and_null_without_a_radio(tmp_path):
     of = static(3, arenas=2)
     counted = tally({Fate.RECEIVED: 2, Fate.LOST: 1, Fate.OUT_OF_RANGE: 4}, {Fate.RECEIVED: 3}, sent=7)
     record(tmp_path, of, [truth(of, 0), truth(of, 1, tally=counted)])
@@ -87,7 +87,7 @@ def test_the_radios_counts_are_those_of_the_tick_and_null_without_a_radio(tmp_pa
     assert table.rows() == [(None,) * 3, (None,) * 3, (7, 2, 3), (7, 3, 3)]
 
 
-def test_a_slow_run_writes_a_part_every_two_seconds(tmp_path):
+def test_slow_run_writes_a_part_every_two_seconds(tmp_path):
     of, clock, metrics = static(2), StillClock(), Metrics()
     recorder = TickRecorder(tmp_path, metrics, clock)
     for observer in (metrics, recorder):
@@ -105,7 +105,7 @@ def test_a_slow_run_writes_a_part_every_two_seconds(tmp_path):
     assert pl.read_parquet(tmp_path / "ticks.parquet")["tick"].to_list() == list(range(9))
 
 
-def test_a_metric_named_like_a_column_is_refused(tmp_path):
+def test_metric_named_like_a_column_is_refused(tmp_path):
     class ReceivedPackets(Order):
         name = "received"
 
@@ -121,7 +121,7 @@ def packets(folder):
     return pl.read_parquet(folder / "packets.parquet")
 
 
-def test_a_row_holds_all_that_is_known_of_a_link(tmp_path):
+def test_packets_row_holds_all_fields_of_a_link(tmp_path):
     of = static(4)
     received = links([0, 2], [1, 3], [7, 8], TICK_NS, to=[-1, 3], rssi_dbm=np.array([-61.5, np.nan]))
     never = links(3, -1, 9, TICK_NS, fate=Fate.QUEUE_FULL, receivers=3, tag=0x0001)
@@ -137,7 +137,7 @@ def test_a_row_holds_all_that_is_known_of_a_link(tmp_path):
     ]
 
 
-def test_a_row_holds_the_bytes_of_its_packet(tmp_path):
+def test_packets_row_holds_the_payload_of_its_packet(tmp_path):
     of = static(4)
     both = replace(
         links([2, 0, 0], [1, 3, 2], [8, 7, 7], TICK_NS),
@@ -150,7 +150,7 @@ def test_a_row_holds_the_bytes_of_its_packet(tmp_path):
 
 
 @pytest.mark.parametrize("in_chunk", [1, 100_000])
-def test_the_distance_is_that_of_the_tick_in_which_it_went_on_air(tmp_path, monkeypatch, in_chunk):
+def test_packets_distance_is_that_of_the_tick_when_it_went_on_air(tmp_path, monkeypatch, in_chunk):
     monkeypatch.setattr(packets_table, "CHUNK_ROWS", in_chunk)
     of = static(2, arenas=2)
     poses = [np.zeros((4, 3)) for _ in range(5)]
@@ -162,7 +162,7 @@ def test_the_distance_is_that_of_the_tick_in_which_it_went_on_air(tmp_path, monk
     assert packets(tmp_path)["distance_m"].to_list() == [2.0, 2.0, 3.0]
 
 
-def test_the_distance_of_a_packet_that_took_too_long_is_unknown(tmp_path, monkeypatch):
+def test_packets_distance_is_null_after_too_long_a_flight(tmp_path, monkeypatch):
     monkeypatch.setattr(packets_table, "POSES_S", 0.2)
     monkeypatch.setattr(packets_table, "CHUNK_ROWS", 1)
     of = static(2)
@@ -171,7 +171,7 @@ def test_the_distance_of_a_packet_that_took_too_long_is_unknown(tmp_path, monkey
     assert packets(tmp_path)["distance_m"].to_list() == [0.0, 0.0, None]
 
 
-def test_a_sample_keeps_whole_packets_and_about_its_share():
+def test_packet_sample_keeps_whole_packets_and_about_its_share():
     sender, sequence, receiver = (a.ravel() for a in np.meshgrid(np.arange(20), np.arange(500), np.arange(3)))
     kept = PacketSample(0.1, (1, 2))(links(sender, receiver, sequence, 0))
     assert (kept.reshape(500, 20, 3).any(axis=2) == kept.reshape(500, 20, 3).all(axis=2)).all()
@@ -182,7 +182,7 @@ def test_a_sample_keeps_whole_packets_and_about_its_share():
     assert np.array_equal(PacketSample(0.1, (2,))(links(sender, receiver, sequence, 0)), other)
 
 
-def test_a_larger_share_keeps_what_a_smaller_one_does():
+def test_packet_sample_of_a_larger_share_contains_the_smaller():
     rows = links(np.arange(200), 0, 3, 0)
     few, more = (PacketSample(share, (1,))(rows) for share in (0.1, 0.6))
     assert (more | ~few).all()
@@ -190,7 +190,7 @@ def test_a_larger_share_keeps_what_a_smaller_one_does():
 
 
 @pytest.mark.parametrize("share", [0.0, -0.1, 1.1, float("nan")])
-def test_a_share_that_is_none_is_refused(tmp_path, share):
+def test_packet_share_that_is_invalid_is_refused(tmp_path, share):
     with pytest.raises(BadInput, check=lambda error: error.key == "packets"):
         PacketRecorder(tmp_path, StillClock(), share)
 
@@ -201,7 +201,7 @@ def test_packets_are_off_unless_asked_for(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"ticks.parquet", "events.parquet", "static.json"}
 
 
-def test_an_event_has_a_row_in_each_arena_with_the_robots_it_changed(tmp_path):
+def test_event_has_a_row_in_each_arena_with_the_robots_it_changed(tmp_path):
     of = static(2, arenas=2)
     kill = EventRecord(0, 0.35, "kill", False, np.array([True, False, True, True]))
     over = EventRecord(0, 0.35, "kill", True, np.zeros(4, np.bool_))
@@ -219,7 +219,7 @@ def kill(*changed: bool, ended: bool = False) -> EventRecord:
     return EventRecord(0, 0.15, "kill", ended, np.array(changed))
 
 
-def test_the_summary_names_the_robots_of_each_arena():
+def test_event_summary_names_the_robots_of_each_arena():
     log, of = EventLog(), static(2, arenas=2)
     log.begin(of)
     log.see(truth(of, 1))
@@ -235,7 +235,7 @@ def broken(*changed: bool) -> EventRecord:
     return EventRecord(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
 
 
-def test_what_failed_is_told_with_its_part():
+def test_fail_event_names_its_part():
     log, of = EventLog(), static(2)
     log.begin(of)
     log.see(truth(of, 2, events=(broken(True, False),)))
@@ -244,7 +244,7 @@ def test_what_failed_is_told_with_its_part():
     assert [event.words for event in (broken(True, True), kill(True, ended=True))] == ["fail motors", "kill ended"]
 
 
-def test_what_happens_singly_has_rows_of_those_arenas_alone_in_which_somebody_changed(tmp_path):
+def test_event_of_single_robots_has_rows_only_of_arenas_it_changed(tmp_path):
     of, recorder = static(2, arenas=2), EventRecorder(tmp_path)
     recorder.begin(of)
     recorder.see(truth(of, 2, events=(broken(False, False, False, True), kill(True, False, False, False))))

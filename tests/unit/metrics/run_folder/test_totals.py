@@ -44,7 +44,7 @@ def states(folder):
     return {finding.part: finding.state for finding in verify(folder.path) if finding.part in TOTALS}
 
 
-def test_the_tables_of_a_run_agree_with_its_summary_and_with_one_another(folder):
+def test_radio_totals_agree_with_the_summary_and_with_one_another(folder):
     assert states(folder) == dict.fromkeys(TOTALS, TableState.INTACT)
     for arena, radio in enumerate(folder.summary["radio"]):
         robots, reached = folder.radio_robots(arena), folder.radio_links(arena)
@@ -69,7 +69,7 @@ def test_the_tables_of_a_run_agree_with_its_summary_and_with_one_another(folder)
         ("radio_distances", ["received", "intended"]),
     ],
 )
-def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, columns):
+def test_radio_totals_that_disagree_with_the_summary_are_named(folder, table, columns):
     file = folder.path / f"{table}.parquet"
     pl.read_parquet(file).with_columns(pl.col(columns) * 2).write_parquet(file)
     assert states(folder) == {**dict.fromkeys(TOTALS, TableState.INTACT), table: TableState.DIFFERS}
@@ -90,7 +90,7 @@ def test_a_table_that_does_not_agree_with_the_summary_is_named(folder, table, co
         ("radio_links", pl.lit(2, pl.Int32).alias("arena"), TableState.DAMAGED, "arena .*1"),
     ],
 )
-def test_what_cannot_be_in_a_table_is_named(folder, table, change, state, text):
+def test_radio_totals_that_are_damaged_are_found_with_their_fault(folder, table, change, state, text):
     file = folder.path / f"{table}.parquet"
     pl.read_parquet(file).with_columns(change).write_parquet(file)
     assert states(folder) == {**dict.fromkeys(TOTALS, TableState.INTACT), table: state}
@@ -106,7 +106,7 @@ def test_without_static_json_tables_are_checked_as_far_as_they_go(folder):
     assert states(folder)["radio_links"] == TableState.DAMAGED
 
 
-def test_the_ratio_is_received_over_intended_in_bins_side_by_side(folder):
+def test_distance_ratio_is_received_over_intended_in_adjacent_bins(folder):
     table = folder.radio_distances(1)
     assert table["from_m"][0] == 0.0
     np.testing.assert_allclose(table["from_m"][1:], table["to_m"][:-1])
@@ -115,7 +115,7 @@ def test_the_ratio_is_received_over_intended_in_bins_side_by_side(folder):
     assert table.filter(pl.col("intended") == 0)["pdr"].null_count() == len(table) - len(some) > 0
 
 
-def test_where_distances_were_forgotten_there_is_no_ratio(tmp_path, monkeypatch):
+def test_distance_ratio_is_null_where_distances_were_forgotten(tmp_path, monkeypatch):
     monkeypatch.setattr(distances, "POSES_S", 0.1)
     of = static(2)
     nothing = links([], [], 0, 0)
@@ -140,7 +140,7 @@ def test_links_are_off_unless_asked_for_and_without_a_radio_there_is_no_table(tm
 
 
 @pytest.mark.parametrize("kind", [RobotCounts, DistanceCounts])
-def test_a_disk_that_refuses_is_told_of(tmp_path, kind):
+def test_disk_that_refuses_a_total_fails_the_record(tmp_path, kind):
     of, recorder = static(2), TotalsRecorder(tmp_path / "gone", "radio_robots", kind)
     recorder.begin(of)
     recorder.see(truth(of, departed=departed([0]), finished=links([], [], 0, 0)))
@@ -194,13 +194,13 @@ def test_everybody_alive_is_meant_by_a_broadcast_however_far_away_and_only_one_b
     assert bins(seen_by(of, {"pose": pose, **addressed}).intended) == {15: 1}
 
 
-def test_a_packet_that_never_went_on_air_tells_nothing_of_distance():
+def test_distance_counts_leave_out_packets_that_never_went_on_air():
     refused = departed([0], fate=Fate.QUEUE_FULL)
     told = {"departed": refused, "finished": links([0], [-1], 0, 0, fate=Fate.QUEUE_FULL, receivers=3)}
     assert not seen_by(static(4), told).intended.any()
 
 
-def test_who_received_so_late_that_the_distance_is_forgotten_is_counted_apart(monkeypatch):
+def test_distance_counts_of_receptions_too_late_are_unknown(monkeypatch):
     monkeypatch.setattr(distances, "POSES_S", 0.2)
     nothing = {"departed": departed([]), "finished": links([], [], 0, 0)}
     late = {**nothing, "finished": links([0], [1], 0, 0)}
@@ -210,7 +210,7 @@ def test_who_received_so_late_that_the_distance_is_forgotten_is_counted_apart(mo
 @pytest.mark.parametrize("pairs_per_tick", [10**6, 10, 3])
 @settings(max_examples=15)
 @given(run=radio_runs())
-def test_it_is_that_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
+def test_distance_counts_are_those_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
     of, seen = run
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(distances, "PAIRS_PER_TICK", pairs_per_tick)
@@ -251,7 +251,7 @@ def test_it_is_that_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
     assert counts.unknown == 0
 
 
-def test_of_many_robots_about_as_many_packets_are_counted_as_said_whatever_their_turn():
+def test_distance_counts_of_large_swarms_take_an_even_share_of_packets():
     of = static(1000)
     counts = DistanceCounts(of)
     assert counts.every == 256

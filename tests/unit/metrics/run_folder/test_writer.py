@@ -44,7 +44,7 @@ def put_many(writer, parts):
 
 
 @pytest.mark.parametrize("parts", [0, 1, 2, 7])
-def test_the_parts_become_one_table_in_order_and_are_gone(tmp_path, parts):
+def test_parts_become_one_table_in_order_and_are_removed(tmp_path, parts):
     writer = TableWriter(tmp_path, "rows", SCHEMA)
     put_many(writer, parts)
     writer.close()
@@ -55,7 +55,7 @@ def test_the_parts_become_one_table_in_order_and_are_gone(tmp_path, parts):
     assert (writer.rows, writer.dropped) == (10 * parts, 0)
 
 
-def test_where_parts_ended_does_not_show_in_the_table(tmp_path):
+def test_parts_leave_no_trace_in_the_joined_table(tmp_path):
     pyarrow_parquet = pytest.importorskip("pyarrow.parquet", reason="comes with the extra [view]")
     writer = TableWriter(tmp_path, "rows", SCHEMA)
     put_many(writer, 5)
@@ -100,7 +100,7 @@ def test_with_a_full_queue_chunks_are_dropped_and_their_rows_counted(tmp_path):
     assert pl.read_parquet(tmp_path / "rows.parquet")["number"].to_list() == list(range(writer.rows))
 
 
-def test_in_lockstep_a_full_queue_holds_the_loop_back_and_nothing_is_dropped(tmp_path):
+def test_full_queue_in_lockstep_blocks_the_loop_and_drops_nothing(tmp_path):
     release, writer = Event(), TableWriter(tmp_path, "rows", SCHEMA)
     begun, busy = held(release)
     writer.put(busy)
@@ -133,7 +133,7 @@ def refuse_after(monkeypatch, files):
     monkeypatch.setattr(writer, "write_file", full)
 
 
-def test_a_full_disk_is_told_once_more_is_put_and_what_was_written_stays(tmp_path, monkeypatch):
+def test_full_disk_is_reported_at_the_next_put_and_written_parts_stay(tmp_path, monkeypatch):
     refuse_after(monkeypatch, 2)
     writer = TableWriter(tmp_path, "rows", SCHEMA)
     with pytest.raises(RecordFailed, match="rows: .*No space left"):
@@ -146,7 +146,7 @@ def test_a_full_disk_is_told_once_more_is_put_and_what_was_written_stays(tmp_pat
     assert writer.dropped >= 10
 
 
-def test_a_join_that_fails_leaves_the_parts(tmp_path):
+def test_join_that_fails_leaves_the_parts(tmp_path):
     (tmp_path / "rows").mkdir()
     for part in range(3):
         write_file(chunk(10 * part).frame(), tmp_path / "rows" / f"part-00000{part}.parquet")
@@ -157,7 +157,7 @@ def test_a_join_that_fails_leaves_the_parts(tmp_path):
     assert len(parts_of(tmp_path, "rows")) == 3
 
 
-def test_a_frame_that_cannot_be_written_leaves_nothing_aside(tmp_path):
+def test_frame_that_cannot_be_written_leaves_no_temporary_file(tmp_path):
     with pytest.raises(OSError):
         write_file(pl.DataFrame({"a": np.arange(3)}), tmp_path / "nowhere" / "a.parquet")
     assert list(tmp_path.iterdir()) == []
@@ -174,13 +174,13 @@ def times_due(limit: ChunkLimit, clock: StillClock, seconds: int) -> list[int]:
     return due
 
 
-def test_a_large_chunk_is_due_at_once() -> None:
+def test_chunk_that_is_large_is_due_at_once() -> None:
     limit = ChunkLimit(10, StillClock())
     assert not limit.reached(9)
     assert limit.reached(10)
 
 
-def test_a_small_one_is_due_every_two_seconds() -> None:
+def test_chunk_that_is_small_is_due_every_two_seconds() -> None:
     clock = StillClock()
     assert times_due(ChunkLimit(10, clock), clock, 1000) == list(range(2, 1001, 2))
 
@@ -190,7 +190,7 @@ class Noon:
         return "20261121T120000Z"
 
 
-def test_each_text_is_in_the_file_at_once_with_its_time(tmp_path):
+def test_log_has_each_text_at_once_with_its_time(tmp_path):
     log = RunLog(tmp_path, Noon())
     log.append("begins")
     log.append("observer X failed:\nTraceback\nOSError\n")
@@ -204,7 +204,7 @@ def test_each_text_is_in_the_file_at_once_with_its_time(tmp_path):
     log.close()
 
 
-def test_a_log_that_cannot_be_written_counts_its_lines_and_disturbs_nobody(tmp_path):
+def test_log_that_cannot_be_written_counts_its_lines_and_raises_nothing(tmp_path):
     (tmp_path / "log.txt").symlink_to("/dev/full")
     log = RunLog(tmp_path, Noon())
     log.append("one")
@@ -219,7 +219,7 @@ def full(to):
         raise OSError(errno.ENOSPC, "No space left on device")
 
 
-def test_a_disk_that_is_full_half_way_is_one_line_and_leaves_what_was_there(tmp_path):
+def test_output_file_on_a_full_disk_is_refused_and_the_old_one_stays(tmp_path):
     to = tmp_path / "page.html"
     to.write_text("before")
     with pytest.raises(BadInput, match="page.html: .*No space left on device"):
@@ -228,7 +228,7 @@ def test_a_disk_that_is_full_half_way_is_one_line_and_leaves_what_was_there(tmp_
     assert list(tmp_path.iterdir()) == [to]
 
 
-def test_what_else_the_block_raises_is_passed_on(tmp_path):
+def test_output_file_passes_on_other_errors_and_leaves_nothing(tmp_path):
     with pytest.raises(FileNotFoundError), output_file(tmp_path / "page.html"):
         (tmp_path / "missing").read_text()
     assert list(tmp_path.iterdir()) == []
@@ -261,7 +261,7 @@ def file(tmp_path_factory):
 
 @settings(max_examples=60)
 @given(data=damaged(parquet(FRAME)))
-def test_a_file_that_is_cut_off_or_changed_is_read_or_refused_in_one_line_that_names_it(file, data):
+def test_damaged_parquet_is_read_or_refused_in_one_line_with_its_name(file, data):
     file.write_bytes(data)
     said = refusal(file)
     if said is not None:
@@ -270,7 +270,7 @@ def test_a_file_that_is_cut_off_or_changed_is_read_or_refused_in_one_line_that_n
         assert "\n" not in said
 
 
-def test_a_panic_of_polars_is_such_a_line_too(file, monkeypatch):
+def test_polars_panic_is_refused_with_the_file(file, monkeypatch):
     def panics(*_, **__):
         raise pl.exceptions.PanicException("called `Result::unwrap()` on an `Err` value")
 
@@ -279,13 +279,13 @@ def test_a_panic_of_polars_is_such_a_line_too(file, monkeypatch):
         read_parquet(file)
 
 
-def test_a_file_that_is_not_there_is_such_a_line_too(tmp_path):
+def test_missing_parquet_is_refused_with_its_name(tmp_path):
     with pytest.raises(BadInput, match="none.parquet: .*No such file"):
         read_parquet(tmp_path / "none.parquet")
 
 
 @given(place=st.integers(0, 2), how=st.sampled_from([parquet(FRAME)[:-1], parquet(FRAME.cast({"order": pl.String}))]))
-def test_of_several_files_the_damaged_one_is_named_or_that_of_other_types(file, place, how):
+def test_damaged_file_among_several_is_named_or_that_of_other_types(file, place, how):
     files = [file.with_name(f"{number}.parquet") for number in range(3)]
     for each in files:
         each.write_bytes(parquet(FRAME))

@@ -33,7 +33,7 @@ def test_seeds_that_both_have_are_compared_one_by_one():
     assert found.p == 0.25
 
 
-def test_what_seeds_share_does_not_blur_a_difference():
+def test_paired_difference_cancels_what_seeds_share():
     rng = np.random.default_rng(5)
     shared = rng.normal(0.0, 5.0, 40)
     first, second = shared + rng.normal(0.0, 0.1, 40), shared + 0.3 + rng.normal(0.0, 0.1, 40)
@@ -68,7 +68,7 @@ def test_turning_the_two_turns_the_sign(one, other):
 
 
 @given(st.one_of(number_samples, time_samples))
-def test_a_sample_does_not_differ_from_itself(sample):
+def test_sample_does_not_differ_from_itself(sample):
     found = difference(sample, sample)
     assert found.median == 0.0 or math.isnan(found.median)
     assert (found.mean, found.delta) == (0.0, 0.0)
@@ -76,7 +76,7 @@ def test_a_sample_does_not_differ_from_itself(sample):
 
 
 @pytest.mark.parametrize("pair", [(numbers([]), numbers([1.0])), (times([]), times([])), (times([2.0]), times([]))])
-def test_of_nothing_nothing_is_told(pair):
+def test_difference_with_an_empty_sample_is_nan(pair):
     found = difference(*pair)
     assert found.pairs == 0
     assert all(math.isnan(value) for value in (found.median, found.mean, found.delta, found.p, *found.mean_interval))
@@ -92,7 +92,7 @@ def test_times_without_pairs_have_the_difference_of_survivals_medians():
     assert found.mean == pytest.approx(np.minimum(placebo().value, 6.0).mean() - 6.0)
 
 
-def test_a_median_beyond_the_limit_leaves_the_difference_unknown_and_its_interval_open():
+def test_median_beyond_the_limit_leaves_its_difference_unknown():
     rng = np.random.default_rng(2)
     found = difference(censored(rng.exponential(5.0, 40), 50.0), censored(rng.exponential(500.0, 40), 50.0))
     assert math.isnan(found.median)
@@ -104,7 +104,7 @@ def test_a_median_beyond_the_limit_leaves_the_difference_unknown_and_its_interva
     assert 30.0 < found.mean_interval.low < found.mean < found.mean_interval.high < 50.0
 
 
-def test_where_both_lie_beyond_the_limit_the_difference_may_be_anything():
+def test_medians_both_beyond_the_limit_leave_the_difference_unbounded():
     rng = np.random.default_rng(2)
     found = difference(censored(rng.exponential(500.0, 40), 50.0), censored(rng.exponential(500.0, 40), 50.0))
     assert found.median_interval == (-math.inf, math.inf)
@@ -150,14 +150,14 @@ def test_distances_are_those_of_scipy(name):
     assert wasserstein_1(a, b) == pytest.approx(stats.wasserstein_distance(a, b), rel=1e-9, abs=1e-12)
 
 
-def test_a_shift_is_a_distance_in_the_values_unit():
+def test_wasserstein_distance_of_a_shift_is_the_shift():
     a = DRAWS.normal(size=500)
     assert wasserstein_1(a, a + 0.25) == pytest.approx(0.25)
     assert kolmogorov_smirnov(a, a + 100.0) == 1.0
     assert kolmogorov_smirnov(a, a[::-1]) == wasserstein_1(a, a[::-1]) == 0.0
 
 
-def test_nothing_has_no_distance():
+def test_distance_to_an_empty_sample_is_nan():
     assert np.isnan(kolmogorov_smirnov(np.zeros(0), np.ones(3)))
     assert np.isnan(wasserstein_1(np.ones(3), np.zeros(0)))
 
@@ -204,7 +204,7 @@ def test_hedges_g_is_none_where_nothing_varies(pair):
     assert math.isnan(hedges_g(np.array(pair[0]), np.array(pair[1])))
 
 
-def test_the_log_rank_test_of_the_leukaemia_trial_is_that_of_the_textbooks():
+def test_log_rank_test_of_the_leukaemia_trial_is_that_of_textbooks():
     found = log_rank(treated(), placebo())
     assert found.z**2 == pytest.approx(16.79, abs=0.005)
     assert found.z < 0.0
@@ -220,5 +220,5 @@ def test_the_log_rank_test_of_the_leukaemia_trial_is_that_of_the_textbooks():
         (times([1.0, 2.0], [False, False]), times([3.0, 4.0])),
     ],
 )
-def test_the_log_rank_test_is_none_where_nothing_tells_samples_apart(pair):
+def test_log_rank_p_is_nan_where_samples_cannot_be_told_apart(pair):
     assert math.isnan(log_rank(*pair).p)

@@ -41,27 +41,27 @@ def test_times_have_quartiles_of_survival_and_those_beyond_the_limit_are_none():
 
 
 @pytest.mark.parametrize("sample", [numbers([]), times([])])
-def test_of_nothing_nothing_is_told(sample):
+def test_summary_of_an_empty_sample_is_nan(sample):
     found = summary(sample)
     assert found.n == 0
     assert all(math.isnan(value) for value in (found.q50, found.mean, found.censored, *found.mean_interval))
 
 
-def test_one_value_has_no_interval():
+def test_summary_of_one_value_has_no_interval():
     found = summary(numbers([3.0]))
     assert (found.q25, found.q50, found.mean) == (3.0, 3.0, 3.0)
     assert all(math.isnan(end) for end in (*found.q50_interval, *found.mean_interval))
 
 
 @given(number_samples)
-def test_the_same_sample_has_the_same_summary_whatever_the_order_of_its_values(sample):
+def test_summary_does_not_depend_on_the_order_of_values(sample):
     once, again, turned = summary(sample), summary(sample), summary(numbers(sample.value[::-1]))
     assert repr(once) == repr(again)
     assert (once.q25, once.q50, once.q50_interval) == (turned.q25, turned.q50, turned.q50_interval)
 
 
 @pytest.mark.parametrize("n", [2, 3, 10, 51])
-def test_every_resample_draws_n_and_every_value_about_equally_often(n):
+def test_resamples_draw_n_values_and_each_about_equally_often(n):
     """A value's mean over 2000 resamples has a standard error of 0.022; five of them fail once in 1e5 lists."""
     counts = draw_counts(n)
     assert (counts.sum(axis=1) == n).all()
@@ -117,7 +117,7 @@ def test_times_of_one_seed_tell_no_more_than_one_of_them():
     assert two.mean_interval.low < two.mean < two.mean_interval.high
 
 
-def test_an_interval_of_what_may_be_infinite_is_open_and_of_what_is_unknown_unknown():
+def test_interval_with_infinite_values_is_open_and_with_nan_unknown():
     resampled = np.array([1.0] * 50 + [math.inf] * 50)
     assert percentile_interval(resampled, 30) == (1.0, math.inf)
     assert math.isnan(percentile_interval(np.array([1.0, math.nan]), 30).low)
@@ -154,7 +154,7 @@ def test_texts_of_quartiles_of_times_beyond_the_limit_say_so():
 
 
 @pytest.mark.parametrize("interval", [UNKNOWN, Interval(-math.inf, math.inf), Interval(math.nan, math.inf)])
-def test_an_interval_that_tells_nothing_is_a_dash(interval):
+def test_interval_that_is_unbounded_or_unknown_is_written_as_a_dash(interval):
     assert interval_text(interval) == "–"
 
 
@@ -196,7 +196,7 @@ def test_equal_processes_are_told_apart_about_as_seldom_as_promised():
     assert apart <= 13
 
 
-def test_a_real_difference_is_seen_with_its_sign():
+def test_difference_of_means_is_found_with_its_sign():
     low, high = mean_difference_interval(sluggish(1), sluggish(2) + 5.0)
     assert 2.0 < low < 5.0 < high < 8.0
 

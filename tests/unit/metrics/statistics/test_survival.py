@@ -27,7 +27,7 @@ def at(curve, column, time):
     return getattr(curve, column)[np.searchsorted(curve.time, time)]
 
 
-def test_the_leukaemia_trial_has_the_survival_of_the_textbooks():
+def test_survival_of_the_leukaemia_trial_is_that_of_textbooks():
     curve = kaplan_meier(treated())
     known = {6: 0.8571, 7: 0.8067, 10: 0.7529, 13: 0.6902, 16: 0.6275, 22: 0.5378, 23: 0.4482}
     for time, survival in known.items():
@@ -68,7 +68,7 @@ def test_quantiles_never_fall_with_the_share(sample, one, other):
 
 
 @given(time_samples, shares)
-def test_a_quantile_lies_within_its_interval(sample, share):
+def test_quantile_lies_within_its_interval(sample, share):
     curve = kaplan_meier(sample)
     (low, high), quantile = curve.quantile_interval(share), curve.quantile(share)
     assert not low > quantile
@@ -82,7 +82,7 @@ def test_other_units_of_time_give_the_same_quantile_in_that_unit(sample, share, 
 
 
 @given(time_samples, shares)
-def test_a_resample_that_draws_each_value_once_has_the_quantile_of_the_sample(sample, share):
+def test_resample_of_each_value_once_has_the_quantile_of_the_sample(sample, share):
     quantile = kaplan_meier(sample).quantile(share)
     found = resampled_quantiles(sample, np.ones((1, len(sample))), share)[0]
     assert found == (math.inf if math.isnan(quantile) else quantile)
@@ -97,7 +97,7 @@ def test_quantiles_of_resamples_are_those_of_the_values_drawn(sample, share):
         assert found == (math.inf if math.isnan(quantile) else quantile)
 
 
-def test_the_restricted_mean_of_uncensored_times_is_the_mean_of_what_the_horizon_leaves_of_them():
+def test_restricted_mean_of_uncensored_times_is_their_mean_up_to_horizon():
     value = np.array([1.0, 4.0, 4.0, 9.0, 20.0])
     for horizon in (0.5, 4.0, 10.0, 20.0, 30.0):
         assert kaplan_meier(times(value)).restricted_mean(horizon) == pytest.approx(np.minimum(value, horizon).mean())
@@ -110,7 +110,7 @@ def test_mean_terms_of_uncensored_times_are_the_times_up_to_the_horizon():
         np.testing.assert_allclose(terms, np.minimum(value, horizon))
 
 
-def test_the_restricted_mean_of_the_leukaemia_trial_is_that_of_the_textbooks():
+def test_restricted_mean_of_the_leukaemia_trial_is_that_of_textbooks():
     curve = kaplan_meier(treated())
     assert curve.restricted_mean(35.0) == pytest.approx(23.287, abs=1e-3)
     terms = curve.mean_terms(treated(), 35.0)
@@ -118,14 +118,14 @@ def test_the_restricted_mean_of_the_leukaemia_trial_is_that_of_the_textbooks():
     assert terms.std() / math.sqrt(len(terms)) == pytest.approx(2.827, abs=1e-3)
 
 
-def test_of_no_times_nothing_is_told():
+def test_survival_of_no_times_is_nan():
     curve = kaplan_meier(times([]))
     assert math.isnan(curve.quantile(0.5))
     assert math.isnan(curve.restricted_mean(3.0))
     assert all(math.isnan(end) for end in curve.quantile_interval(0.5))
 
 
-def test_where_nothing_happened_every_quantile_lies_beyond():
+def test_quantiles_lie_beyond_where_nothing_happened():
     curve = kaplan_meier(times([5.0, 5.0], [False, False]))
     assert math.isnan(curve.quantile(0.01))
     assert curve.restricted_mean(5.0) == 5.0
@@ -144,12 +144,12 @@ def test_intervals_of_a_censored_median_cover_it_as_often_as_they_say():
 
 
 @given(time_samples, time_samples)
-def test_who_is_surely_less_has_the_other_surely_greater(one, other):
+def test_surely_less_and_surely_greater_are_inverse(one, other):
     assert surely_less(one, other).sum() == surely_greater(other, one).sum()
     assert surely_greater(one, other).sum() == surely_less(other, one).sum()
 
 
-def test_a_censored_time_is_after_all_observed_up_to_then_and_before_none():
+def test_censored_time_is_after_times_before_it_and_before_none():
     waited, seen = times([5.0], [False]), times([4.0, 5.0, 6.0])
     assert surely_less(waited, seen).tolist() == [2]
     assert surely_greater(waited, seen).tolist() == [0]
@@ -167,7 +167,7 @@ def exact_p(one, other):
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_the_p_value_of_pairs_is_near_that_of_swapping_the_two_of_each(seed):
+def test_p_of_pairs_is_near_that_of_all_swaps_within_pairs(seed):
     rng = np.random.default_rng(seed)
     first, second = rng.exponential(10.0, 12), rng.exponential(20.0, 12)
     one, other = (times(np.minimum(value, 15.0), value <= 15.0) for value in (first, second))

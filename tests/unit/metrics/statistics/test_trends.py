@@ -30,7 +30,7 @@ def noisy(curve, seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_lower_aic_is_that_of_the_true_form(seed):
+def test_lower_aic_is_that_of_the_true_form(seed):
     """The two curves are 4 standard errors apart at their farthest, so AIC errs less than once in 1e4."""
     line = degradation(SHARE, noisy(1.0 - SHARE, seed))
     exponential = degradation(SHARE, noisy(np.exp(-2.0 * SHARE), seed))
@@ -42,13 +42,13 @@ def test_the_lower_aic_is_that_of_the_true_form(seed):
     assert line.better.r_squared > 0.9
 
 
-def test_a_fit_says_what_is_left_at_a_stress():
+def test_fit_evaluates_performance_at_a_stress():
     of = {"a_interval": UNKNOWN, "b_interval": UNKNOWN, "r_squared": 1.0, "aic": 0.0}
     assert Fit("linear", 1.0, -0.5, **of).evaluate(np.array([0.0, 0.4])).tolist() == pytest.approx([1.0, 0.8])
     assert Fit("exponential", 2.0, -1.0, **of).evaluate(np.array([0.5])).tolist() == pytest.approx([2 * math.exp(-0.5)])
 
 
-def test_the_line_is_that_of_least_squares():
+def test_linear_degradation_is_the_fit_of_least_squares():
     table = noisy(1.0 - 0.5 * SHARE, 1)
     fitted = degradation(SHARE, table)
     assert fitted is not None
@@ -56,7 +56,7 @@ def test_the_line_is_that_of_least_squares():
     assert (fitted.linear.a, fitted.linear.b) == (pytest.approx(start), pytest.approx(slope))
 
 
-def test_a_seed_that_comes_twice_tells_no_more_than_once():
+def test_duplicated_seed_narrows_no_interval():
     table = noisy(np.exp(-SHARE), 5)
     once, twice = (
         degradation(SHARE, SeedTable(np.tile(table, copies), np.tile(np.arange(20), copies))) for copies in (1, 2)
@@ -97,7 +97,7 @@ def test_runs_on_a_curve_are_fitted_exactly():
     assert fitted.better.r_squared == pytest.approx(1.0)
 
 
-def test_what_does_not_fall_has_no_slope_and_the_forms_are_not_told_apart():
+def test_flat_performance_has_no_slope_and_no_clear_form():
     flat = degradation(SHARE, np.full((10, 3), 0.8))
     assert flat is not None
     assert flat.linear.b == pytest.approx(0.0, abs=1e-12)
@@ -105,7 +105,7 @@ def test_what_does_not_fall_has_no_slope_and_the_forms_are_not_told_apart():
     assert flat.better.form == "linear"
 
 
-def test_nothing_is_relative_to_no_performance():
+def test_degradation_of_zero_performance_is_none():
     assert degradation(SHARE, np.zeros((10, 3))) is None
 
 
@@ -116,7 +116,7 @@ def test_performance_that_does_not_vary_has_no_share_of_variance():
     assert math.isnan(fitted.linear.r_squared)
 
 
-def test_two_stresses_are_too_few():
+def test_degradation_of_two_stresses_is_none():
     table = noisy(1.0 - SHARE, 1)
     table[2:] = np.nan
     assert degradation(SHARE, table) is None
@@ -178,7 +178,7 @@ def brute_force(table):
     return int(np.argmin(squares))
 
 
-def test_a_step_is_found_with_its_size():
+def test_step_is_found_with_its_size():
     found = change_point(LOSS, noise(1) + np.where(LOSS >= 0.4, 0.3, 0.9)[:, None])
     assert found is not None
     assert (found.after, found.before, found.position) == (0.3, 0.4, pytest.approx(0.35))
@@ -190,7 +190,7 @@ def test_a_step_is_found_with_its_size():
     assert found.gain > 0.0
 
 
-def test_where_nothing_changes_a_step_is_found_in_one_case_of_a_hundred_at_most():
+def test_step_is_found_in_noise_once_in_a_hundred_at_most():
     """Of 200, more than 5 would be found by chance once in a thousand lists of seeds; these are fixed."""
     assert sum(change_point(LOSS, noise(seed)) is not None for seed in range(200)) <= 5
 
@@ -219,7 +219,7 @@ def test_cliff_is_a_step_and_neither_line_nor_exponential():
     assert not line.is_step
 
 
-def test_a_small_step_among_much_noise_has_a_wide_interval_that_holds_it():
+def test_small_step_in_much_noise_has_a_wide_interval_that_holds_it():
     found = change_point(LOSS, noise(3) + np.where(LOSS >= 0.4, 0.08, 0.0)[:, None])
     assert found is not None
     assert found.position_interval.low < found.position_interval.high
@@ -227,7 +227,7 @@ def test_a_small_step_among_much_noise_has_a_wide_interval_that_holds_it():
 
 
 @given(st.integers(0, 10_000), st.integers(1, 7))
-def test_the_step_is_where_brute_force_finds_it(seed, split):
+def test_step_is_where_brute_force_finds_it(seed, split):
     table = noise(seed) + np.where(np.arange(8) >= split, 1.0, 0.0)[:, None]
     found = change_point(LOSS, table)
     assert found is not None
@@ -256,11 +256,11 @@ def test_points_and_runs_without_values_are_left_out():
 @pytest.mark.parametrize(
     "table", [np.full((8, 5), 0.7), np.zeros((8, 5)), np.full((8, 5), np.nan), np.eye(8, 5) * np.nan]
 )
-def test_a_constant_has_no_step(table):
+def test_constant_response_has_no_step(table):
     assert change_point(LOSS, table) is None
 
 
-def test_a_step_without_noise_is_found():
+def test_step_without_noise_is_found():
     found = change_point(LOSS, np.where(LOSS >= 0.4, 1.0, 0.0)[:, None] * np.ones(5))
     assert found is not None
     assert (found.position, found.effect, found.standardised) == (pytest.approx(0.35), 1.0, math.inf)

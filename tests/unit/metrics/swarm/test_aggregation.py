@@ -22,7 +22,7 @@ def close(swarm, pose, radius_m, gap_m):
 
 
 @given(swarms(), gaps)
-def test_it_is_the_largest_component_of_the_graph_of_small_gaps(swarm, gap_m):
+def test_aggregation_is_the_largest_component_of_small_gaps(swarm, gap_m):
     values = []
     for pose, radius_m in swarm.arenas:
         graph = nx.from_numpy_array(close(swarm, pose, radius_m, gap_m))
@@ -42,7 +42,7 @@ def test_within_one_hop_it_is_that_of_the_algorithm(swarm, gap_m):
     assert said(AggregationHop(gap_m=gap_m), swarm) == pytest.approx(values, nan_ok=True)
 
 
-def test_a_star_is_one_flock_either_way_and_a_chain_is_not():
+def test_star_is_one_flock_by_either_measure_and_a_chain_is_not():
     apart_m = 3.9 * RADIUS_M
     star = [(0, 0), (apart_m, 0), (-apart_m, 0), (0, apart_m), (0, -apart_m)]
     assert said("aggregation", stand(*star)) == said("aggregation_hop", stand(*star)) == [1.0]
@@ -63,7 +63,7 @@ def test_by_default_the_gap_is_a_diameter_from_surface_to_surface(diameters, sha
     assert said("aggregation", two) == said("aggregation_hop", two) == [share]
 
 
-def test_of_mixed_bodies_it_is_the_mean_of_both_diameters():
+def test_aggregation_gap_of_mixed_bodies_is_the_mean_diameter():
     two = stand((0, 0), (1, 0))
     both = replace(two, of=mixed(two.of, 1))
     sum_m = sum(group.body.radius_m for group in both.of.groups)
@@ -100,14 +100,14 @@ def time_s(together, robots=5, **parameters):
         ([4, 1, 4, 4, 1, 4, 4], 0.2, np.nan),
     ],
 )
-def test_the_time_is_the_start_of_the_first_stretch_that_was_held(together, hold_s, exact):
+def test_aggregation_time_is_the_start_of_the_first_held_stretch(together, hold_s, exact):
     assert time_s(together, hold_s=hold_s) == [pytest.approx(exact, nan_ok=True)]
 
 
 @pytest.mark.parametrize(
     ("share", "robots", "least"), [(0.8, 5, 4), (0.6, 5, 3), (0.28, 25, 7), (0.81, 5, 5), (0.01, 5, 1)]
 )
-def test_the_share_is_rounded_up_to_robots(share, robots, least):
+def test_aggregation_share_is_rounded_up_to_robots(share, robots, least):
     assert time_s([least], robots, share=share) == [0.0]
     if least > 1:
         assert np.isnan(time_s([least - 1], robots, share=share)).all()
@@ -125,7 +125,7 @@ def test_by_one_hop_a_chain_is_not_together_and_a_star_is():
 
 @settings(max_examples=50)
 @given(st.lists(st.tuples(*[st.integers(1, 5)] * 3), min_size=1, max_size=12), st.integers(0, 4))
-def test_each_arena_has_the_start_of_its_own_first_long_stretch(together, hold):
+def test_aggregation_time_of_each_arena_is_that_of_its_own_stretch(together, hold):
     values = []
     for own in zip(*together, strict=True):
         starts = [k for k in range(len(own) - hold) if all(robots >= 4 for robots in own[k : k + hold + 1])]

@@ -18,7 +18,7 @@ def speed(velocity, **given) -> float:
     return measured("speed", of, truth(of, velocity=np.array(velocity, float), **given))[0]
 
 
-def test_the_mean_is_over_robots_whichever_way_they_go():
+def test_speed_is_the_mean_over_robots_in_any_direction():
     assert speed([[0.3, 0.4, 0.0], [-0.1, 0.0, 0.0], [0.0, 0.0, 9.0]]) == pytest.approx(0.2)
 
 
@@ -32,7 +32,7 @@ def efficiency(place, alive=None, boundary="open", arenas=1):
     return told("path_efficiency", *ticks, of=swarms[0].of)
 
 
-def test_a_straight_way_is_one_a_way_back_is_zero_and_a_half_circle_two_over_pi():
+def test_path_efficiency_of_line_return_and_half_circle_is_known():
     straight = np.linspace([0.0, 0.0], [3.0, 4.0], 201)
     angle = np.linspace(0.0, np.pi, 201)
     half = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -41,7 +41,7 @@ def test_a_straight_way_is_one_a_way_back_is_zero_and_a_half_circle_two_over_pi(
     assert efficiency(half[:, None]) == [pytest.approx(2.0 / np.pi, rel=1e-4)]
 
 
-def test_who_has_not_moved_is_left_out():
+def test_path_efficiency_leaves_out_robots_that_did_not_move():
     place = np.zeros((3, 2, 2))
     place[:, 0, 0] = 0.0, 0.1, 0.2
     place[:, 1, 0] = 0.0, 0.001, 0.0
@@ -55,7 +55,7 @@ def test_on_a_torus_once_around_is_a_side_away():
     assert efficiency(around, boundary="torus") == [pytest.approx(1.0)]
 
 
-def test_a_random_walk_has_the_known_mean():
+def test_path_efficiency_of_a_random_walk_has_the_known_mean():
     """sqrt(pi / (4 n)) of n steps, as the order of n headings at random; its variance is below 0.22 / n.
 
     5 standard errors of 500 walks: false alarm 6e-7.
@@ -113,7 +113,7 @@ def test_changes_of_side_beyond_the_dead_band_count(turn_radps, dead_band_radps,
     assert found == [pytest.approx(changes_per_tick * PER_MIN)]
 
 
-def test_the_dead_neither_count_nor_remember():
+def test_dead_robots_neither_count_nor_remember_in_oscillation():
     alive = np.array([[True, True], [True, False], [True, True]])
     assert oscillation([[0, 1], [0, -1], [0, -1]], alive=alive) == [0.0]
     assert np.isnan(oscillation([[1.0], [-1.0]], alive=np.zeros((2, 1), np.bool_))).all()
@@ -211,7 +211,7 @@ def test_cohesion_is_the_largest_distance_to_the_centroid(swarm):
     assert said("cohesion", swarm) == pytest.approx(values, abs=1e-9, nan_ok=True)
 
 
-def test_a_ring_has_its_radius():
+def test_cohesion_of_a_ring_is_its_radius():
     angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     ring = stand(*np.column_stack([1.0 + 0.5 * np.cos(angle), 0.5 * np.sin(angle)]))
     assert said("cohesion", ring) == [pytest.approx(0.5)]
@@ -243,14 +243,14 @@ def test_dispersion_is_that_of_the_formula(swarm):
 
 
 @pytest.mark.parametrize(("rings", "least"), [(0, 0.0), (1, 6.0), (2, 48.0), (3, 186.0)])
-def test_a_hexagonal_packing_has_its_known_second_moment(rings, least):
+def test_hexagonal_packing_has_its_known_second_moment(rings, least):
     """Squares of distances in diameters: 6 x 1, then 6 x 4 + 6 x 3, then 6 x 9 + 12 x 7."""
     packed = stand(*hexagon(rings, 2.0 * RADIUS_M))
     assert said("dispersion", packed) == [pytest.approx(least, abs=1e-12)]
     assert said("dispersion", stand(*hexagon(rings, 4.0 * RADIUS_M))) == [pytest.approx(4.0 * least, abs=1e-12)]
 
 
-def test_of_mixed_bodies_the_radius_squared_is_the_mean_of_those_alive():
+def test_dispersion_of_mixed_bodies_is_in_their_mean_square_radius():
     two = stand((0, 0), (1, 0), (0.5, 0))
     both = replace(two, of=mixed(two.of, 1), alive=np.array([True, True, False]))
     small_m, large_m = (group.body.radius_m for group in both.of.groups)
@@ -282,22 +282,22 @@ HALF_TURNED = np.arange(12) % 2 * np.pi
 @pytest.mark.parametrize(
     ("offset_rad", "exact"), [(np.pi / 2, 1.0), (-np.pi / 2, 1.0), (0.0, 0.0), (np.pi / 2 + HALF_TURNED, 0.0)]
 )
-def test_a_ring_that_mills_either_way_has_one_and_a_ring_that_opens_or_mills_both_ways_none(offset_rad, exact):
+def test_rotation_of_a_ring_is_one_only_if_it_mills_one_way(offset_rad, exact):
     assert said("rotation", stand(*ring(12, offset_rad, at=(1.0, -0.5)))) == [pytest.approx(exact, abs=1e-12)]
 
 
-def test_a_ring_that_goes_one_way_has_none():
+def test_rotation_of_a_ring_moving_in_one_direction_is_zero():
     one_way = ring(12, 0.0)
     one_way[:, 2] = 0.4
     assert said("rotation", stand(*one_way)) == [pytest.approx(0.0, abs=1e-12)]
 
 
-def test_a_mill_across_the_corner_of_a_torus_is_one():
+def test_rotation_of_a_mill_across_a_torus_corner_is_one():
     mill = ring(12, np.pi / 2, at=(4.0, 3.0))
     mill[:, :2] = rolled(mill[:, :2])
     assert said("rotation", stand(*mill, boundary="torus")) == [pytest.approx(1.0)]
 
 
-def test_a_robot_at_the_centroid_adds_nothing():
+def test_robot_at_the_centroid_adds_nothing_to_rotation():
     assert said("rotation", stand((1.0, 1.0, 0.3))) == [0.0]
     assert said("rotation", stand(*ring(4, np.pi / 2), (0.0, 0.0, 1.0))) == [pytest.approx(0.8)]

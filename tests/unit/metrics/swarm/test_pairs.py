@@ -41,7 +41,7 @@ def test_near_pairs_are_those_of_all_pairs_each_once_whatever_the_reaches(swarm,
 
 
 @pytest.mark.parametrize("boundary", ["walls", "torus"])
-def test_of_many_robots_that_move_they_are_found_tick_by_tick(boundary):
+def test_near_pairs_of_many_moving_robots_are_found_tick_by_tick(boundary):
     rng = np.random.default_rng(1)
     place = rng.uniform([-4.0, -3.0], [4.0, 3.0], (200, 2))
     reach_m = rng.choice([0.02, 0.3], 200)
@@ -63,7 +63,7 @@ def test_robots_far_outside_an_open_arena_are_found():
     assert pairs_found(swarm, np.full(4, 0.1)) == [(1, 2)]
 
 
-def test_they_are_found_once_a_tick_for_all_who_ask_by_the_same_reaches_alone():
+def test_near_pairs_are_shared_within_a_tick_only_for_equal_reaches():
     swarm = stand((0.0, 0.0), (1.0, 0.0))
     wide, as_wide, narrow = (NearPairs(swarm.of, np.full(2, reach_m)) for reach_m in (0.6, 0.6, 0.4))
     view = TickView(swarm.of, swarm.seen())
@@ -83,7 +83,7 @@ def mean_nearest_m(swarm):
 
 @settings(max_examples=150)
 @given(swarms(least=9, most=40))
-def test_the_nearest_neighbour_is_that_of_all_pairs(swarm):
+def test_nearest_neighbour_is_that_of_all_pairs(swarm):
     assert said("nearest_neighbour", swarm) == pytest.approx(mean_nearest_m(swarm), abs=1e-12, nan_ok=True)
 
 
@@ -98,7 +98,7 @@ def test_neighbours_of_the_tick_before_change_nothing(boundary):
         assert metrics.latest["nearest_neighbour"].tolist() == pytest.approx(mean_nearest_m(swarm), abs=1e-12)
 
 
-def test_a_lattice_of_triangles_has_its_spacing_and_a_torus_goes_on():
+def test_nearest_neighbour_in_a_triangular_lattice_is_its_spacing():
     lattice = [(x + 0.5 * (row % 2) - 4.0, 0.75 * row - 3.0) for row in range(8) for x in range(8)]
     assert said("nearest_neighbour", stand(*lattice, boundary="torus")) == [pytest.approx(np.hypot(0.5, 0.75))]
     corners = (-3.9, 0.0), (3.9, 2.9), (3.9, -2.9)
@@ -131,13 +131,13 @@ def gap(*at, arenas=1, **fields):
     return measured("min_gap", of, truth(of, pose=pose, **fields))
 
 
-def test_a_gap_is_from_surface_to_surface():
+def test_gap_is_from_surface_to_surface():
     assert gap((0, 0), (3, 4), (0.3, 0.4)) == [pytest.approx(0.5 - 0.07)]
 
 
 @given(st.lists(places, min_size=2, max_size=20))
 @example([(0.0, 0.0, 0.1, (0.0, 1.0)), (0.5, 0.0, 0.05, (0.0, 1.0)), (1.0, 0.0, 0.8, (0.0, 1.0))])  # far, but large
-def test_the_smallest_gap_is_that_of_all_pairs_also_of_different_bodies(robots):
+def test_smallest_gap_of_different_bodies_is_that_of_all_pairs(robots):
     x, y, radius = np.array([robot[:3] for robot in robots]).T
     span = np.array([robot[3] for robot in robots])
     pairs = [
@@ -152,7 +152,7 @@ def test_the_smallest_gap_is_that_of_all_pairs_also_of_different_bodies(robots):
     assert told == pytest.approx(nearest, abs=1e-12, nan_ok=True)
 
 
-def test_a_drone_above_a_robot_is_not_near_it():
+def test_drone_above_a_robot_is_not_near_it():
     of = static(2)
     (flock,) = of.groups
     drone = replace(flock, name="air", body=replace(flock.body, altitude_m=1.0), start=2, stop=4)
@@ -164,7 +164,7 @@ def test_a_drone_above_a_robot_is_not_near_it():
     assert np.isnan(measured("min_gap", both, truth(both, pose=pose, alive=alone))).all()
 
 
-def test_the_order_of_the_tick_before_changes_no_gap():
+def test_gap_does_not_depend_on_the_order_of_the_tick_before():
     of, rng = static(30, arenas=2), np.random.default_rng(1)
     metrics = Metrics(["min_gap"])
     metrics.begin(of)
@@ -184,7 +184,7 @@ def rate_per_h(of, onsets, alive):
 
 
 @given(st.integers(0, 1000), st.integers(1, 20), st.sampled_from([0.0, 0.1, 0.9]))
-def test_the_rate_is_twice_the_onsets_over_the_time_of_the_robots_alive_and_walls_do_not_count(seed, ticks, dead):
+def test_collision_rate_is_twice_the_onsets_over_living_robot_time(seed, ticks, dead):
     rng, of = np.random.default_rng(seed), static(3, arenas=2)
     onsets, alive = rng.integers(0, 3, (ticks, 2)), rng.random((ticks, 6)) >= dead
     alive[:, 3:] &= rng.random() < 0.8
@@ -245,12 +245,12 @@ def robots(*one):
 AHEAD, TURN, ASIDE = np.tile([0.1, 0, 0], (11, 1)), np.tile([0, 1.0, 0], (11, 1)), np.tile([0, 0, -0.1], (11, 1))
 
 
-def test_who_was_told_to_go_and_did_not_is_deadlocked():
+def test_deadlocked_robot_is_one_that_drives_without_moving():
     still, gone = path((0, 0)), path((0.01, 0))
     assert after(robots(still, gone, still, still), robots(AHEAD, AHEAD, TURN, ASIDE)) == [0.5]
 
 
-def test_who_goes_to_and_fro_is_deadlocked():
+def test_deadlocked_robot_may_go_to_and_fro():
     dither = path((0, 0))
     dither[1::2, 0] = 0.03
     back = AHEAD * np.where(np.arange(11) % 2, -1, 1)[:, None]
@@ -262,7 +262,7 @@ def test_before_a_window_has_passed_nobody_knows():
     assert np.isnan(after(still, robots(AHEAD[:10]))).all()
 
 
-def test_the_dead_do_not_count_and_were_told_nothing():
+def test_dead_robots_are_not_deadlocked_and_had_no_command():
     place, command = robots(path((0, 0)), path((0, 0))), robots(AHEAD, AHEAD)
     alive = np.ones((11, 2), np.bool_)
     alive[-1, 1] = False
@@ -273,7 +273,7 @@ def test_the_dead_do_not_count_and_were_told_nothing():
     assert np.isnan(after(place, command, alive=np.zeros((11, 2), np.bool_))).all()
 
 
-def test_who_went_across_the_seam_of_a_torus_by_little_is_deadlocked():
+def test_deadlocked_robot_may_cross_the_seam_of_a_torus():
     place = robots(path((0.002, 0), start=(3.99, 0)))
     place = rolled(place)
     assert after(place, robots(AHEAD), boundary="torus") == [1.0]
@@ -282,7 +282,7 @@ def test_who_went_across_the_seam_of_a_torus_by_little_is_deadlocked():
 
 @settings(max_examples=50)
 @given(st.integers(0, 1000), st.integers(2, 30), st.sampled_from(["walls", "torus"]))
-def test_the_deadlocked_are_those_of_the_definition(seed, ticks, boundary):
+def test_deadlocked_robots_are_those_of_the_definition(seed, ticks, boundary):
     rng, window = np.random.default_rng(seed), 10
     place = rolled(np.cumsum(rng.normal(0.0, 0.02, (ticks, 6, 2)), axis=0) + rng.uniform(-4, 4, (1, 6, 2)))
     command = rng.normal(0.0, 0.06, (ticks, 6, 3)) * (rng.random((1, 6, 1)) < 0.7)

@@ -27,14 +27,14 @@ def both(of, values, alive=None):
     return in_each_tick(of, seen, "consensus_error", "consensus_bias")
 
 
-def test_the_error_is_the_deviation_of_those_that_live_and_told_a_number():
+def test_consensus_error_is_the_deviation_of_living_robots_with_a_value():
     nan = np.nan
     alive = [[True, True, True, False]] * 3
     found = both(static(4), [None, [1.0, nan, nan, 9.0], [1.0, nan, 5.0, 9.0]], alive)
     assert found[:, 0, 0].tolist() == pytest.approx([nan, 0.0, 2.0], nan_ok=True)
 
 
-def test_the_bias_is_how_far_the_mean_has_gone_from_that_of_the_first_values():
+def test_consensus_bias_is_the_drift_from_the_mean_of_first_values():
     nan = np.nan
     values = [[0.0, 4.0, nan], [1.0, 4.0, 8.0], [4.0, 4.0, 4.0], [4.0, 4.0, 4.0]]
     alive = [[True] * 3] * 3 + [[False] * 3]
@@ -42,7 +42,7 @@ def test_the_bias_is_how_far_the_mean_has_gone_from_that_of_the_first_values():
 
 
 @given(st.integers(1, 3), st.integers(1, 6), st.data())
-def test_they_are_numpys_deviation_and_means(arenas, robots, data):
+def test_consensus_error_and_bias_are_those_of_numpy(arenas, robots, data):
     rows = arenas * robots
     ticks = data.draw(st.lists(st.lists(numbers, min_size=rows, max_size=rows), min_size=1, max_size=4))
     alive = [data.draw(st.lists(st.booleans() | st.just(True), min_size=rows, max_size=rows)) for _ in ticks]
@@ -88,7 +88,7 @@ def found(x_m, alive=None, within_m=0.5, lights=LIGHTS_OF_ARENAS, share=0.0, rob
     return told, metrics.end(None)["metrics"]
 
 
-def test_it_is_when_the_first_robot_came_near_a_light_and_stays():
+def test_find_time_is_when_the_first_robot_reached_a_light_and_stays():
     told, summary = found(
         [[0, 0, 4, 1, 0, 0], [1, 1.5, 4, 4, 0, 0], [1, 0, 0.51, 4, 0, 0], [2, -3, 0.49, 4, 0, 0]],
     )
@@ -98,20 +98,20 @@ def test_it_is_when_the_first_robot_came_near_a_light_and_stays():
     assert [arena["find_time_s"]["final"] for arena in summary] == [0.1, 0.3, None]
 
 
-def test_the_dead_find_nothing_and_what_was_found_stays_found():
+def test_dead_robots_find_nothing_and_finds_outlast_deaths():
     alive = [[False, True], [True, True], [False, False]]
     told, _ = found([[2, 0], [2, 0], [0, 0]], alive, lights=LIGHTS_OF_ARENAS[:1])
     assert told == [[pytest.approx(np.nan, nan_ok=True)], [0.1], [0.1]]
 
 
-def test_the_distance_is_a_parameter():
+def test_find_distance_is_a_parameter():
     assert found([[0.9, 0], [1.0, 0]], within_m=1.0, lights=LIGHTS_OF_ARENAS[:1])[0] == [
         [pytest.approx(np.nan, nan_ok=True)],
         [0.1],
     ]
 
 
-def test_of_a_share_of_the_robots_alive_as_many_must_be_there_at_once():
+def test_find_share_needs_that_many_living_robots_at_once():
     x_m = [[2, 0, 0, 0, 0], [0, 2, 2, 0, 0], [2, 2, 2, 0, 0]]
     ticks = [found(x_m, lights=LIGHTS_OF_ARENAS[:1], share=share, robots=5)[0] for share in (0.2, 0.4, 0.6)]
     assert [told[-1] for told in ticks] == [[0.0], [0.1], [0.2]]
@@ -130,7 +130,7 @@ def targets(lights, *at, arenas=1):
     return measured("target_best", of, seen), measured("target_mean", of, seen)
 
 
-def test_each_robot_counts_to_the_light_nearest_to_it():
+def test_robot_counts_to_its_nearest_light():
     assert targets([LIGHTS], (0.3, 0.4), (3.0, 1.0), (5.0, 0.0)) == ([0.5], [pytest.approx(3.5 / 3)])
 
 
@@ -200,7 +200,7 @@ def brute_force(of, ticks, alive, sensing_m, cell_m):
     st.sampled_from([0.31, 0.5, 0.77]),
     st.lists(st.sampled_from([BOX, POLYGON, CYLINDER]), max_size=3, unique=True),
 )
-def test_it_is_what_asking_every_cell_about_every_robot_gives(seed, boundary, sensing_m, cell_m, obstacles):
+def test_coverage_is_that_of_testing_every_cell_against_every_robot(seed, boundary, sensing_m, cell_m, obstacles):
     rng = np.random.default_rng(seed)
     of = replace(static(3, arenas=2, obstacles=obstacles), arena_size_m=(6.0, 4.4), boundary=boundary)
     beyond = 0.0 if boundary == "walls" else 0.4
@@ -210,7 +210,7 @@ def test_it_is_what_asking_every_cell_about_every_robot_gives(seed, boundary, se
     np.testing.assert_array_equal(found, brute_force(of, ticks, alive, sensing_m, cell_m))
 
 
-def test_a_robot_covers_a_disc():
+def test_coverage_of_a_robot_is_a_disc():
     of = replace(static(1), arena_size_m=(10.0, 10.0))
     assert shares(of, [[(0.3, -0.2)]], sensing_m=2.0, cell_m=0.05)[0, 0] == pytest.approx(np.pi * 4 / 100, rel=0.01)
     assert shares(of, [[(5.0, 5.0)]], sensing_m=2.0, cell_m=0.05)[0, 0] == pytest.approx(np.pi / 100, rel=0.01)
@@ -218,7 +218,7 @@ def test_a_robot_covers_a_disc():
     assert shares(torus, [[(5.0, 5.0)]], sensing_m=2.0, cell_m=0.05)[0, 0] == pytest.approx(np.pi * 4 / 100, rel=0.01)
 
 
-def test_it_only_rises_whoever_dies_and_the_dead_cover_nothing():
+def test_coverage_only_rises_and_dead_robots_cover_nothing():
     of = replace(static(2), arena_size_m=(4.0, 1.0))
     ticks = [[(-1.5, 0), (1.5, 0)], [(-1.5, 0), (-0.5, 0)], [(0.5, 0), (1.5, 0)], [(0.5, 0), (1.5, 0)]]
     alive = [[True, False], [True, True], [True, False], [False, False]]
@@ -226,7 +226,7 @@ def test_it_only_rises_whoever_dies_and_the_dead_cover_nothing():
     assert found.ravel().tolist() == [0.25, 0.5, 0.75, 0.75]
 
 
-def test_a_large_sensing_range_covers_all_at_once():
+def test_coverage_of_a_large_sensing_range_is_all_at_once():
     for boundary in ("walls", "torus"):
         of = replace(static(1), boundary=boundary)
         assert shares(of, [[(1.0, 1.0)]], sensing_m=1e6).tolist() == [[1.0]]
@@ -240,7 +240,7 @@ def test_cells_of_fixed_obstacles_are_not_free_and_those_of_movable_ones_are():
         assert shares(of, at, sensing_m=0.1, cell_m=0.5).tolist() == [[1 / free]]
 
 
-def test_where_nothing_is_free_there_is_none():
+def test_coverage_is_nan_where_no_cell_is_free():
     of = replace(static(1, obstacles=[Obstacle("box", 0.0, 0.0, size_m=(2.0, 2.0))]), arena_size_m=(2.0, 2.0))
     assert np.isnan(shares(of, [[(0.0, 0.0)]])).all()
 
@@ -251,7 +251,7 @@ def test_more_cells_than_memory_should_hold_are_refused():
         shares(of, [[(0.0, 0.0)]])
 
 
-def test_the_time_is_when_the_share_was_reached():
+def test_coverage_time_is_when_the_share_was_reached():
     of = replace(static(1, arenas=2), arena_size_m=(4.0, 1.0))
     metrics, found = Metrics([CoverageTime(sensing_m=0.1, cell_m=1.0, share=0.75)]), []
     metrics.begin(of)

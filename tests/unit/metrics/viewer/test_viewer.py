@@ -51,7 +51,7 @@ def test_rays_leave_the_rim_where_the_sensors_look_and_end_where_they_read(tmp_p
     assert moved == {0: [[1.0, 2.0, 0.0]]}
 
 
-def test_a_ray_has_the_colour_of_what_it_meets_and_noise_is_nothing(tmp_path):
+def test_ray_has_the_colour_of_its_obstacle_and_noise_counts_as_none(tmp_path):
     of = static(2)
     pose = np.array([[0, 0, 0], [0.0, 0.09, 0]])  # the other stands on the ray to the left
     value = np.array([[0.5, 0.04, 0.5, 0, 0, 0, 0, 0], [0] * 8], float)
@@ -79,7 +79,7 @@ def test_between_its_turns_it_keeps_what_it_sensed_and_the_dead_sense_nothing(tm
 
 
 @pytest.mark.parametrize(("robots", "expected"), [(200, list(range(12))), (201, [0, 4, 5, 10])])
-def test_in_large_swarms_rays_that_see_nothing_are_thinned_as_links_are(tmp_path, robots, expected):
+def test_rays_that_see_nothing_are_thinned_in_large_swarms(tmp_path, robots, expected):
     of = static(robots)
     ticks = [
         truth(of, tick, readings=sensed([0], proximity_value=np.full((1, 8), 0.5 if tick == 4 else 0.0)))
@@ -97,13 +97,13 @@ def test_photocells_are_bars_as_long_as_what_they_see(tmp_path):
     np.testing.assert_allclose(length_m, 2.0 * EPUCK.radius_m * value[0], atol=1e-6)
 
 
-def test_an_agent_that_senses_nothing_has_no_rays(tmp_path):
+def test_agent_that_senses_nothing_has_no_rays(tmp_path):
     of = static(2)
     record(tmp_path / "run.rrd", of, [truth(of, tick) for tick in range(3)])
     assert rays(tmp_path / "run.rrd") == {}
 
 
-def test_the_first_robot_with_rays_is_selected_unless_another_is_named():
+def test_selected_robot_is_the_first_with_rays_unless_named():
     blind = replace(EPUCK, sensors={})
     of = static(4)
     mixed = replace(of, groups=(Group("a", blind, 0, 2), Group("b", EPUCK, 2, 4)))
@@ -112,7 +112,7 @@ def test_the_first_robot_with_rays_is_selected_unless_another_is_named():
     assert selected_robot(mixed, "flock-1", "here") == "flock-1"
 
 
-def test_a_robot_that_is_not_there_cannot_be_selected(tmp_path):
+def test_selected_robot_that_does_not_exist_is_refused(tmp_path):
     with pytest.raises(BadInput, check=lambda error: error.key == "selected" and "'nobody'" in error.expected):
         record(tmp_path / "run.rrd", static(2), [], selected="nobody")
 
@@ -129,7 +129,7 @@ def test_while_the_selected_robot_is_dead_the_next_one_alive_of_its_group_is_sho
     assert names == {0: ["flock-1"], 1: ["flock-2"], 2: ["flock-0"], 3: ["flock-1"]}
 
 
-def test_a_robot_of_another_group_never_takes_the_place_of_a_dead_one():
+def test_selected_dead_robot_is_replaced_only_within_its_group():
     mixed = replace(static(4), groups=(Group("a", EPUCK, 0, 2), Group("b", EPUCK, 2, 4)))
     assert living_robot(mixed, 1, np.array([False, False, True, True])) == 1
     assert living_robot(mixed, 3, np.array([True, True, True, False])) == 2
@@ -177,7 +177,7 @@ def refused(values):
         ({"a": []}, 0, 0),
     ],
 )
-def test_what_waits_is_counted_in_all_fields_whatever_holds_them(fields, least, most):
+def test_buffered_bytes_count_all_fields_of_any_container(fields, least, most):
     rows = RerunRows(SentPackets())
     for tick in range(3):
         rows.begin_tick(tick, tick)
@@ -185,7 +185,7 @@ def test_what_waits_is_counted_in_all_fields_whatever_holds_them(fields, least, 
     assert 3 * least <= rows.buffered_bytes - 3 * ROW_BYTES <= 3 * most
 
 
-def test_an_entity_that_fails_takes_no_other_with_it_and_is_told():
+def test_entity_that_fails_is_reported_and_the_others_are_sent():
     pytest.importorskip("rerun", reason="needs the extra [view]")
     rec = SentPackets()
     rows = RerunRows(rec)
