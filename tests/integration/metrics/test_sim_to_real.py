@@ -85,7 +85,7 @@ def compared(emulated: EmulatedRuns, of: Watched, folder) -> SimToReal:
     return compare_sim_to_real(emulated, measured_log(logs, MEASURES, of.static), MEASURES)
 
 
-def test_a_run_is_near_itself(runs, tmp_path):
+def test_run_is_near_the_log_of_itself(runs, tmp_path):
     watched_runs, many = runs
     alone = replace(many, runs=many.runs[:1])
     found = compared(alone, watched_runs[0], tmp_path)
@@ -111,7 +111,7 @@ def test_another_seed_lies_within_the_spread(runs, tmp_path):
     assert f"{sum(within)} of 6 metrics, {sum(radio)} of 5 " in verdict(found)
 
 
-def test_a_swarm_at_half_the_speed_does_not(runs, tmp_path):
+def test_swarm_at_half_the_speed_is_outside_the_spread(runs, tmp_path):
     found = compared(runs[1], watched("robots.flock.params.speed_mps=0.05", seed=11), tmp_path)
     assert found.rows[0].metric.name == "speed"
     assert found.rows[0].within is False
@@ -132,7 +132,7 @@ def test_counts_have_a_tolerance_of_their_own(runs, tmp_path, sent, within):
 
 
 @pytest.mark.parametrize(("events", "within"), [(100, True), (101, True), (103, True), (110, False)])
-def test_a_metric_of_events_may_have_one_more_at_either_end(runs, tmp_path, events, within):
+def test_metric_of_events_tolerates_one_event_more_at_either_end(runs, tmp_path, events, within):
     """In each of the runs an event happens in every third tick, 100 in all."""
     watched_runs, many = runs
     metric = METRICS["collisions"]()
@@ -145,7 +145,7 @@ def test_a_metric_of_events_may_have_one_more_at_either_end(runs, tmp_path, even
     assert row.within is within
 
 
-def test_what_is_not_compared_has_its_reason(runs, tmp_path):
+def test_metrics_that_are_not_compared_have_their_reason(runs, tmp_path):
     found = compared(runs[1], watched(seed=11), tmp_path)
     assert "contacts" in found.not_in_log["collisions"]
     assert "range" in found.not_in_log["link_pdr"]  # some were out of it
@@ -157,7 +157,7 @@ def test_what_is_not_compared_has_its_reason(runs, tmp_path):
     assert any("p-values" in line for line in meanings(found))
 
 
-def test_a_metric_that_neither_side_can_have_is_passed_over_one_that_one_has_is_told(runs, tmp_path):
+def test_metric_that_neither_side_has_is_skipped_and_that_one_has_is_named(runs, tmp_path):
     _, many = runs
     nothing = np.full(200, np.nan)
     neither = tuple(replace(run, series={"target_best": nothing, "order": nothing}) for run in many.runs)
@@ -175,7 +175,7 @@ def test_metrics_that_the_run_did_not_keep_are_told(runs, tmp_path):
     assert [row.metric.name for row in found.rows] == ["order"]
 
 
-def test_only_the_time_in_common_is_compared(runs, tmp_path):
+def test_comparison_covers_only_the_time_in_common(runs, tmp_path):
     of = watched(seed=11)
     short = Watched()
     short.static, short.truths = of.static, of.truths[:101]
@@ -187,7 +187,7 @@ def test_only_the_time_in_common_is_compared(runs, tmp_path):
     assert any("packets sent, total pdr, " in line for line in left_out(found))
 
 
-def test_of_a_longer_run_the_counts_of_its_ticks_tell_what_the_radio_did_meanwhile(tmp_path):
+def test_radio_counts_of_a_longer_run_are_cut_to_the_common_time(tmp_path):
     """Afterwards nothing is sent any more, which the time that is compared does not know."""
     of = watched("radio.range_m=20", "duration_s=10", out=tmp_path / "run")
     kept = runs_of_folder(tmp_path / "run", NAMES)
@@ -202,7 +202,7 @@ def test_of_a_longer_run_the_counts_of_its_ticks_tell_what_the_radio_did_meanwhi
     assert found.not_compared.keys() == {"latency p50", "latency p90", "latency p99"}
 
 
-def test_of_a_longer_log_the_radio_is_that_of_the_time_that_is_compared(runs, tmp_path):
+def test_radio_counts_of_a_longer_log_are_cut_to_the_common_time(runs, tmp_path):
     """It is silent from the tenth second on, after which the run that it is held against ends."""
     of = runs[0][0]
     folder = as_logs(of, tmp_path)
@@ -244,14 +244,14 @@ def test_latencies_over_a_runs_radio_are_held_against_those_to_the_agent(runs, t
     assert "latency_agent" in log.series
 
 
-def test_two_runs_have_no_spread(runs, tmp_path):
+def test_verdict_on_two_runs_has_no_spread(runs, tmp_path):
     two = replace(runs[1], runs=runs[1].runs[:2])
     found = compared(two, watched(seed=11), tmp_path)
     assert not found.judged
     assert verdict(found).startswith("2 runs ")
 
 
-def test_a_metric_has_a_text_for_each_column():
+def test_metric_row_has_a_text_for_each_column():
     row = MetricRow(
         METRICS["min_gap"](), Spread(0.1, 0.2, 0.3), 0.25, (NOTHING,), NOTHING, ks=0.125, distance=0.05, reach=0.04
     )
@@ -262,14 +262,14 @@ def test_a_metric_has_a_text_for_each_column():
     assert cells["within"] == "no"
 
 
-def test_a_single_run_has_a_value_and_no_spread():
+def test_metric_row_of_a_single_run_has_a_value_and_no_spread():
     row = MetricRow(METRICS["order"](), Spread(0.5, 0.5, 0.5), 0.5, (NOTHING,), NOTHING, ks=0.0, distance=0.0)
     cells = dict(zip(COLUMNS, metric_cells(row), strict=True))
     assert cells["emulated"] == "0.5"
     assert cells["within"] not in ("yes", "no")
 
 
-def test_a_number_of_the_radio_has_a_text_for_each_column():
+def test_radio_row_has_a_text_for_each_column():
     value = RadioValue("latency, median", "s", "how long", (0.01, 0.02, 0.03), log=0.02, grain=0.0)
     row = RadioRow(value, Spread(0.01, 0.02, 0.03), 3)
     cells = dict(zip(RADIO_COLUMNS, radio_cells(row), strict=True))
@@ -277,7 +277,7 @@ def test_a_number_of_the_radio_has_a_text_for_each_column():
     assert (cells["log"], cells["within"]) == ("0.02", "yes")
 
 
-def test_of_a_run_folder(tmp_path):
+def test_runs_of_a_run_folder_have_its_series(tmp_path):
     watched("duration_s=3", seed=2, out=tmp_path / "run")
     of = runs_of_folder(tmp_path / "run", METRIC_NAMES)
     folder = RunFolder(tmp_path / "run")
@@ -287,7 +287,7 @@ def test_of_a_run_folder(tmp_path):
     assert of.runs[0].duration_s == pytest.approx(3.0)
 
 
-def test_of_a_campaigns_point(tmp_path, monkeypatch):
+def test_runs_of_a_campaign_point_have_its_series(tmp_path, monkeypatch):
     monkeypatch.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
     short = [*SMALL, "duration_s=3"]
     sweep(LOSSY, seeds=[1, 2], vary={"radio.loss": [0.3, 0.6]}, overrides=short, out=tmp_path / "c")

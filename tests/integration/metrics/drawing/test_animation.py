@@ -57,7 +57,7 @@ def test_robots_have_the_colour_of_their_group_where_they_are(index):
     assert robots_shown(film(), index) == [robot_color(0), robot_color(0), robot_color(1)]
 
 
-def test_a_frame_shows_only_its_own_tick():
+def test_frame_shows_only_its_own_tick():
     of = film(ticks=61)
     figure = FilmFigure(of, SIZE_PX)
     figure.frame(0)
@@ -84,7 +84,7 @@ def test_states_colour_the_robots_that_are_in_them():
     assert robots_shown(of, 10)[2] == STATE_COLORS[0]
 
 
-def test_of_many_states_the_most_frequent_have_a_colour():
+def test_states_beyond_the_colours_share_one_and_the_frequent_have_their_own():
     names = tuple(f"s{i}" for i in range(len(STATE_COLORS) + 1))
     state = np.arange(31 * 3).reshape(31, 3) % len(names)
     state[-1] = [0, 3, 4]
@@ -126,7 +126,7 @@ def test_links_join_robots_alive_in_range_and_sight(given, joined):
     assert (shown(film(**given), 0, *across) != [FLOOR] * 3) == joined
 
 
-def test_a_trail_follows_a_robot_that_moved_and_fades():
+def test_trail_follows_a_robot_that_moved_and_fades():
     of = film(ticks=101)
     pose = of.pose[100, 0]
     near, far, beyond = shown(of, 100, *((pose[0] - behind, pose[1]) for behind in (0.4, 2.0, 3.0)))
@@ -149,20 +149,20 @@ def test_robots_that_fly_lie_above_those_on_the_floor():
     assert robots_shown(flying(0.0), 0)[0] == robot_color(1)
 
 
-def test_only_robots_that_fly_cast_a_shadow():
+def test_shadow_lies_only_below_robots_that_fly():
     beneath = (-2.7, -1.375)  # just outside the disc
     (shadow,), (floor,) = shown(flying(1.0), 0, beneath), shown(flying(0.0), 0, beneath)
     assert floor == FLOOR
     assert sum(shadow) < sum(FLOOR) - 60
 
 
-def test_the_legend_tells_how_high_a_group_flies():
+def test_legend_has_the_altitude_of_a_group_that_flies():
     air, floor = legend_of(flying(1.0))[:2]
     assert (air[:7], "1 m" in air, floor) == ("air (1)", True, "floor (2)")
 
 
 @pytest.mark.parametrize("index", [0, 30])
-def test_a_saved_picture_shows_what_the_frame_does(tmp_path, index):
+def test_picture_that_is_saved_shows_what_the_frame_does(tmp_path, index):
     from PIL import Image
 
     figure = FilmFigure(film(), SIZE_PX)
@@ -173,14 +173,14 @@ def test_a_saved_picture_shows_what_the_frame_does(tmp_path, index):
     np.testing.assert_array_equal(saved, frame)
 
 
-def test_the_sides_of_a_frame_are_even_whatever_its_size():
+def test_frame_has_even_sides_at_any_size():
     for size_px in (101, 333, 480):
         height, width, _ = FilmFigure(film(), size_px).frame(0).shape
         assert height % 2 == width % 2 == 0
         assert abs(max(height, width) - size_px) <= 1
 
 
-def test_only_metrics_that_have_values_are_plotted_unless_they_are_asked_for():
+def test_metrics_without_values_are_plotted_only_if_listed():
     assert len(FilmFigure(film(), 300)._figure.axes) == 2
     assert len(FilmFigure(film(), 300, ["order", "min_gap"])._figure.axes) == 3
     assert len(FilmFigure(film(metrics={}), 300)._figure.axes) == 1
@@ -205,7 +205,7 @@ def test_speed_of_a_film_is_shown_beside_its_time():
     assert figure._time.get_text() == "t = 1.0 s"
 
 
-def test_a_metric_of_the_users_own_is_plotted_by_its_numbers_alone():
+def test_custom_metric_is_plotted_by_its_numbers_alone():
     axes = FilmFigure(film(metrics={"my_share": np.linspace(0.2, 0.5, 31)}), 300, ["my_share"])._figure.axes[1]
     low, high = axes.get_ylim()
     assert axes.get_title(loc="left") == "my share"
@@ -222,7 +222,7 @@ def test_arenas_of_any_form_are_seen_whole(size_m):
         assert color_at(figure, image, x_m * size_m[0], y_m * size_m[1]) == FLOOR
 
 
-def test_a_crowd_is_drawn():
+def test_crowd_of_300_robots_is_drawn():
     robots, ticks = 300, 20
     static = replace(
         two_groups(),
@@ -238,13 +238,13 @@ def test_a_crowd_is_drawn():
     ("size", "metrics", "where", "key"),
     [(10, None, "--size", ""), (300, ["ordr"], "--metric", "ordr"), (300, ["order"] * 5, "--metric", "")],
 )
-def test_what_cannot_be_drawn_is_refused(size, metrics, where, key):
+def test_film_options_that_cannot_be_drawn_are_refused(size, metrics, where, key):
     with pytest.raises(BadInput, check=lambda error: (error.where, error.key) == (where, key)):
         FilmFigure(film(), size, metrics)
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "absent/a.png", "."])
-def test_a_path_that_cannot_be_written_is_refused(tmp_path, name):
+def test_path_that_cannot_be_written_is_refused_for_a_picture(tmp_path, name):
     with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / name)):
         FilmFigure(film(), 300).save(0, tmp_path / name)
     assert not any(tmp_path.iterdir())
@@ -293,7 +293,7 @@ def robot_at(figure, tick):
     return int(figure.frame(tick).shape[0] - up), int(x)
 
 
-def test_a_gif_has_a_frame_per_tick_in_the_colours_of_the_picture(figure, tmp_path):
+def test_gif_has_a_frame_per_tick_in_the_colours_of_the_picture(figure, tmp_path):
     from PIL import Image
 
     write_gif(tmp_path / "a.gif", (figure.frame(i) for i in TICKS), [figure.frame(0).copy()], 12.5)
@@ -317,7 +317,7 @@ def test_frames_that_do_not_differ_prolong_the_one_before(figure, tmp_path):
         assert gif.info["duration"] == 200
 
 
-def test_an_mp4_decodes_to_a_frame_per_tick_in_the_colours_of_the_picture(figure, tmp_path):
+def test_mp4_decodes_to_a_frame_per_tick_in_the_colours_of_the_picture(figure, tmp_path):
     import imageio_ffmpeg
 
     write_mp4(tmp_path / "a.mp4", (figure.frame(i) for i in TICKS), 5.0)

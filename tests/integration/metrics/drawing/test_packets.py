@@ -36,7 +36,7 @@ def colors_on_the_way(fate: Fate, index: int) -> list[tuple[int, ...]]:
     return [tuple(image[int(len(image) - up), int(column)].tolist()) for column, up in places]
 
 
-def test_a_received_packet_is_a_line_to_its_receiver_and_a_lost_one_ends_on_the_way():
+def test_packet_received_is_a_line_to_its_receiver_and_lost_ends_on_the_way():
     (near, far), (near_lost, far_lost) = colors_on_the_way(Fate.RECEIVED, ENDED), colors_on_the_way(Fate.LOST, ENDED)
     assert near[2] > near[0], "blue"
     assert far == near
@@ -45,11 +45,11 @@ def test_a_received_packet_is_a_line_to_its_receiver_and_a_lost_one_ends_on_the_
 
 
 @pytest.mark.parametrize("index", [ENDED - 1, ENDED + 1])
-def test_a_packet_is_shown_in_the_tick_in_which_it_ended_alone_and_in_place_of_links(index):
+def test_packet_is_drawn_only_in_the_tick_of_its_end_and_replaces_links(index):
     assert colors_on_the_way(Fate.RECEIVED, index) == [FLOOR, FLOOR]
 
 
-def test_each_tick_shows_as_many_received_packets_as_the_run_counted_and_partitions_while_they_hold(folder):
+def test_packets_in_a_film_are_as_many_per_tick_as_the_run_counted(folder):
     of = film_of(folder, 0, "run")
     packets = packets_of(folder, of)
     assert packets is not None
@@ -61,7 +61,7 @@ def test_each_tick_shows_as_many_received_packets_as_the_run_counted_and_partiti
     assert 1.0 < min(parted_s) <= max(parted_s) <= 1.7
 
 
-def test_a_run_without_recorded_packets_has_none(tmp_path):
+def test_packets_of_a_run_that_recorded_none_are_absent_from_its_film(tmp_path):
     run(ROOT / "scenarios" / "partition.toml", overrides=["duration_s=0.2"], out=tmp_path / "run")
     folder = RunFolder(tmp_path / "run")
     assert packets_of(folder, film_of(folder, 0, "run")) is None

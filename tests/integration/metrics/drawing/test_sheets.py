@@ -25,7 +25,7 @@ pytest.importorskip("matplotlib", reason="needs the extra [report]")
 
 
 @pytest.mark.parametrize("name", body_names())
-def test_every_body_that_comes_along_can_be_drawn(tmp_path, name):
+def test_body_drawing_exists_for_every_shipped_body(tmp_path, name):
     from PIL import Image
 
     draw_body(load_body(name), tmp_path / "a.png")
@@ -34,7 +34,7 @@ def test_every_body_that_comes_along_can_be_drawn(tmp_path, name):
         assert len(np.unique(np.asarray(image).reshape(-1, 4), axis=0)) > 50
 
 
-def test_a_body_without_any_sense_can_be_drawn(tmp_path):
+def test_body_without_any_sensor_can_be_drawn(tmp_path):
     drive = {"wheel_base_m": 0.1, "max_wheel_mps": 0.2, "max_force_n": 1.0, "max_torque_nm": 1.0}
     sheet = {"name": "bare", "source": "a test", "radius_m": 0.1, "height_m": 0.1, "mass_kg": 1.0, "drive": drive}
     draw_body(body_from(sheet, "bare.toml"), tmp_path / "a.svg")
@@ -71,7 +71,7 @@ def test_rays_of_a_scan_fade_only_where_they_leave_the_view_and_the_legend_tells
     assert any(text.get_text().endswith(f" {range_m:g} m") for text in legend.get_texts())
 
 
-def test_the_facts_are_those_of_the_data_sheet():
+def test_body_facts_are_those_of_the_data_sheet():
     facts = dict(facts_of(load_body("epuck")))
     numbers = {name: re.findall(r"[\d.]+ (?:%|\w+)", text) for name, text in facts.items()}
     assert numbers["size"] == ["7 cm", "8.6 cm"]
@@ -82,7 +82,7 @@ def test_the_facts_are_those_of_the_data_sheet():
     assert "1 cm" in dict(facts_of(load_body("epuck-gps")))["positioning"]
 
 
-def test_each_fact_has_a_name_of_its_own():
+def test_body_facts_have_distinct_names():
     for name in body_names():
         names = [fact for fact, _ in facts_of(load_body(name)) if fact]
         assert len(names) == len(set(names)), name
@@ -96,13 +96,13 @@ def test_own_senses_and_actuators_are_facts_by_their_class():
     assert [facts[name].split()[-1] for name in ("gas", "sealer")] == ["gas.py:Sniffer", "gas.py:Sealer"]
 
 
-def test_only_a_body_that_flies_is_told_to():
+def test_body_facts_have_an_altitude_only_for_bodies_that_fly():
     flying = body_from({"like": "epuck", "name": "flying", "altitude_m": 1.0}, "flying.toml")
     assert "1 m" in dict(facts_of(flying))["flies"]
     assert "flies" not in dict(facts_of(load_body("epuck")))
 
 
-def test_a_size_that_nobody_could_look_at_is_refused():
+def test_picture_size_that_is_too_large_is_refused():
     with pytest.raises(BadInput, check=lambda error: error.where == "--size" and "8000" in error.expected):
         canvas.new_figure(6.4, 4.8, 9000)
 
@@ -132,7 +132,7 @@ def test_coverage_of_signals_has_a_map_of_strength_and_that_of_a_disk_of_reach(t
     assert (tmp_path / "coverage.png").stat().st_size > 1000
 
 
-def test_the_curve_is_that_of_the_table_up_to_somewhat_beyond_what_was_received(tmp_path, monkeypatch):
+def test_delivery_curve_of_the_table_ends_just_beyond_what_was_received(tmp_path, monkeypatch):
     of, drawn = static(6, arenas=2), []
     record(tmp_path, of, ticks(DISK, of, 3, count=20))
     monkeypatch.setattr(radio, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
@@ -170,7 +170,7 @@ def test_distances_that_cannot_be_drawn_are_refused(tmp_path):
         (None, "no column pdr"),
     ],
 )
-def test_a_damaged_table_is_refused_with_file_and_fault(tmp_path, change, fault):
+def test_damaged_table_of_distances_is_refused_with_file_and_fault(tmp_path, change, fault):
     of = static(6)
     record(tmp_path, of, ticks(DISK, of, 3, count=20))
     file = tmp_path / "radio_distances.parquet"
@@ -182,7 +182,7 @@ def test_a_damaged_table_is_refused_with_file_and_fault(tmp_path, change, fault)
 
 
 @pytest.mark.parametrize("module", ["matplotlib", "imageio_ffmpeg", "jinja2"])
-def test_who_lacks_the_extra_is_told_how_to_get_it(tmp_path, monkeypatch, module):
+def test_missing_module_for_drawing_names_the_extra_that_brings_it(tmp_path, monkeypatch, module):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(BadInput, match=rf"^pictures: .*{module}.*swarmwire-metrics\[report\]"):
         draw_body(load_body("epuck"), tmp_path / "a.png")

@@ -52,7 +52,7 @@ def test_robots_come_in_the_order_of_their_index(folder):
     assert (logs.rate_hz, logs.notes) == (10.0, ())
 
 
-def test_a_single_robots_folder_is_a_swarm_of_one(folder):
+def test_single_robots_folder_is_a_swarm_of_one(folder):
     logs = read_real_logs(folder / "flock-2")
     assert logs.names == ("flock-2",)
     assert "flock-0, flock-1, flock-3, flock-4 and 1 more" in logs.notes[0]
@@ -74,7 +74,7 @@ def test_logs_may_lie_one_deeper_and_of_each_robot_the_newest_start_counts(folde
     assert read_real_logs(tmp_path / "starts" / "flock-1").robots[0].where.endswith("a-second")
 
 
-def test_a_killed_robot_ends_in_half_a_line_which_is_dropped_and_told(folder):
+def test_killed_robots_half_written_line_is_dropped_with_a_note(folder):
     whole = read_real_logs(folder).robots[1]
     (folder / "flock-1" / "summary.json").unlink()
     for name in ("ticks.csv", "received.csv"):
@@ -90,7 +90,7 @@ def test_a_killed_robot_ends_in_half_a_line_which_is_dropped_and_told(folder):
     assert "flock-1's ticks.csv, received.csv" in dropped
 
 
-def test_a_robot_that_was_killed_at_once_wrote_nothing(folder):
+def test_empty_logs_of_a_robot_killed_at_once_are_read(folder):
     for name in ("ticks.csv", "received.csv", "sent.csv"):
         (folder / "flock-1" / name).write_bytes(b"")
     assert len(read_real_logs(folder).robots[1].steps.time_s) == 0
@@ -150,7 +150,7 @@ def test_rows_that_cannot_be_are_refused_with_their_place(folder, name, row, tol
     assert told_of in refused.value.key
 
 
-def test_what_is_no_log_is_refused(folder, tmp_path):
+def test_folder_without_a_real_log_is_refused(folder, tmp_path):
     (tmp_path / "other" / "deeper" / "still").mkdir(parents=True)
     for path in (tmp_path / "nowhere", tmp_path / "other"):
         with pytest.raises(BadInput, check=lambda error, path=path: error.where == str(path)):
@@ -232,7 +232,7 @@ def test_robots_that_step_when_they_like_measure_within_the_error_of_interpolati
         assert np.nanmean(np.abs(of.series[name] - series[name][: len(of.series[name])])) < within, name
 
 
-def test_what_a_log_cannot_know_is_left_out_with_the_reason_and_never_0(tmp_path):
+def test_measures_that_a_log_cannot_know_are_left_out_and_never_0(tmp_path):
     of = measured(tmp_path)
     assert set(of.left_out) == {"collisions", "components", "airtime"}
     assert not set(of.left_out) & set(of.series)
@@ -240,7 +240,7 @@ def test_what_a_log_cannot_know_is_left_out_with_the_reason_and_never_0(tmp_path
 
 
 @pytest.mark.parametrize("name", METRICS)
-def test_every_metric_is_measured_as_in_the_run_or_left_out_since_the_log_lacks_what_it_reads(name, real, of_run):
+def test_metric_of_a_log_is_that_of_the_run_or_left_out_for_missing_data(name, real, of_run):
     metric = METRICS[name]()
     found = measures(real.static, real.truths(), [metric])
     if missing_data(metric, has_poses=True) is not None:
@@ -250,7 +250,7 @@ def test_every_metric_is_measured_as_in_the_run_or_left_out_since_the_log_lacks_
 
 
 @pytest.mark.parametrize("name", [name for name in METRICS if missing_data(METRICS[name](), has_poses=False) is None])
-def test_what_is_measured_without_poses_needs_none(name, real):
+def test_metric_measured_without_poses_does_not_depend_on_them(name, real):
     metric, unknown = METRICS[name](), np.full_like(real._motion.pose, np.nan)
     blind = replace(real, _motion=replace(real._motion, pose=unknown, velocity=unknown))
     with_poses, without = (measures(real.static, of.truths(), [metric]) for of in (real, blind))
@@ -274,7 +274,7 @@ def test_clocks_that_are_apart_are_told_and_set_right(tmp_path, emulated):
     assert np.nanmean(np.abs(of.series["cohesion"] - series["cohesion"][: len(of.series["cohesion"])])) < 0.01
 
 
-def test_a_robot_without_a_log_takes_its_packets_along(tmp_path, emulated):
+def test_robot_without_a_log_is_missing_from_the_packet_counts(tmp_path, emulated):
     folder = as_logs(flock(), tmp_path)
     (folder / "flock-4").rename(tmp_path.parent / f"{tmp_path.name}-away")
     of = measured_log(read_real_logs(folder), MEASURES)
@@ -285,7 +285,7 @@ def test_a_robot_without_a_log_takes_its_packets_along(tmp_path, emulated):
     assert of.radio["pdr"] == pytest.approx(0.7, abs=0.1)
 
 
-def test_a_robot_that_was_killed_ends_the_comparison_for_all(tmp_path):
+def test_robot_that_was_killed_ends_the_comparison_for_all(tmp_path):
     folder = as_logs(flock(), tmp_path)
     path = folder / "flock-3" / "ticks.csv"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:102]))

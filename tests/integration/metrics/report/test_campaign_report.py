@@ -61,7 +61,7 @@ def ordinary(tmp_path, **differently):
     return write_campaign(tmp_path / "made-up", **{"vary": {"radio.loss": LOSS}, "seeds": FEW, **differently})
 
 
-def test_one_parameter_has_curves_and_no_map(tmp_path):
+def test_report_of_one_parameter_has_curves_and_no_map(tmp_path):
     sections, shown = of(ordinary(tmp_path))
     assert list(sections) == [
         *("Transitions", "Survival", "Distributions", "Summary", "Resilience", "Setup", "Methods")
@@ -74,7 +74,7 @@ def test_one_parameter_has_curves_and_no_map(tmp_path):
     check_alone(shown)
 
 
-def test_two_parameters_have_maps_and_robots_have_scaling(tmp_path):
+def test_report_of_two_parameters_has_maps_and_of_robot_counts_scaling(tmp_path):
     vary = {"radio.loss": LOSS, "robots.flock.count": COUNTS}
     sections, shown = of(ordinary(tmp_path, vary=vary, seeds=(1, 2, 3)), ["order", "aggregation_time_s"])
     maps = [part for part in sections["Transitions"].parts if hasattr(part, "svg")]
@@ -103,7 +103,7 @@ def test_three_numbers_are_drawn_in_pairs(tmp_path):
     assert names == [f"map-order.final-{pair}" for pair in ("a.x-a.y", "a.x-a.z", "a.y-a.z")]
 
 
-def test_a_single_point_has_a_table_and_survival_alone(tmp_path):
+def test_report_of_a_single_point_has_only_table_and_survival(tmp_path):
     sections, shown = of(ordinary(tmp_path, vary={}, points=[{}]))
     assert list(sections) == ["Survival", "Summary", "Setup", "Methods"]
     assert shown.table("n", "median")[0][0] == "6"
@@ -168,7 +168,7 @@ def test_quartiles_of_times_beyond_the_limit_say_so(tmp_path):
     assert "Transitions" not in sections
 
 
-def test_a_limit_is_never_rounded_up_to_what_nobody_watched(tmp_path):
+def test_limit_of_a_time_is_not_rounded_up_beyond_what_was_observed(tmp_path):
     times = {"found_s": lambda point, _: None if point["who"] == "never" else 2.0}
     folder = write_campaign(tmp_path / "a", {"who": ["soon", "never"]}, range(4), numbers={}, times=times, limit_s=2.6)
     _, shown = of(folder)
@@ -215,13 +215,13 @@ def test_before_any_run_has_ended_there_is_a_report_all_the_same(tmp_path):
     assert list(sections) == ["Setup", "Methods"]
 
 
-def test_when_every_run_failed_there_is_a_report_all_the_same(tmp_path):
+def test_report_exists_when_every_run_failed(tmp_path):
     sections, shown = of(ordinary(tmp_path, failed=range(24)))
     assert shown.table("error", "runs")[0][1] == "24"
     assert "Transitions" not in sections
 
 
-def test_what_does_not_vary_or_never_came_is_left_out_and_named(tmp_path):
+def test_constant_and_missing_responses_are_left_out_and_named(tmp_path):
     numbers = {
         "order.final": lambda _, rng: rng.random(),
         "components.final": lambda *_: 1.0,
@@ -233,7 +233,7 @@ def test_what_does_not_vary_or_never_came_is_left_out_and_named(tmp_path):
     assert "Left out (without a value in any run): gap_m.final and never_s ." in said
 
 
-def test_what_is_asked_for_is_shown_even_if_it_never_varies(tmp_path):
+def test_responses_that_are_listed_are_shown_even_if_constant(tmp_path):
     numbers = {"order.final": lambda _, rng: rng.random(), "components.final": lambda *_: 1.0}
     _, shown = of(ordinary(tmp_path, numbers=numbers), ["components", "aggregation_time_s"])
     assert [row[2] for row in shown.table("radio.loss", "n")] == ["1"] * 4
@@ -243,7 +243,7 @@ def test_what_is_asked_for_is_shown_even_if_it_never_varies(tmp_path):
         of(tmp_path / "made-up", ["ordre"])
 
 
-def test_a_jump_is_found_where_it_is(tmp_path):
+def test_change_point_is_found_where_the_response_jumps(tmp_path):
     step = {"order.final": lambda point, rng: float(point["radio.loss"] < 0.3) + 0.05 * rng.standard_normal()}
     _, shown = of(ordinary(tmp_path, numbers=step, times={}))
     assert [row[1] for row in shown.table("response", "change point")] == ["0.3"]
@@ -252,7 +252,7 @@ def test_a_jump_is_found_where_it_is(tmp_path):
 @pytest.mark.parametrize(
     ("shape", "better"), [(lambda f: 1.0 - f, "linear"), (lambda f: np.exp(-4.0 * f), "exponential")]
 )
-def test_the_shape_of_what_is_left_is_named(tmp_path, shape, better):
+def test_resilience_names_the_better_of_linear_and_exponential(tmp_path, shape, better):
     vary = {"events.0.robots.share": [0.0, 0.2, 0.4, 0.6, 0.8]}
     numbers = {
         "order.final": lambda point, rng: float(shape(point["events.0.robots.share"])) + 0.01 * rng.standard_normal(),
@@ -298,7 +298,7 @@ def test_axis_of_shares_starts_at_zero_unless_all_are_large(least, low):
     assert axes.get_ylim() == pytest.approx((low, 1.0 + 0.03 * (1.0 - low)))
 
 
-def test_a_scenario_may_be_called_anything(tmp_path):
+def test_scenario_name_with_markup_is_escaped_in_a_report(tmp_path):
     _, shown = of(ordinary(tmp_path, name="<script>alert(1)</script> & co"))
     assert "<script>alert(1)</script> & co" in shown.said
     check_alone(shown)
@@ -316,7 +316,7 @@ def test_figures_are_files_beside_the_page_as_in_it(tmp_path):
     assert write_report(report, tmp_path / "b.html")[1].parent == tmp_path / "b-figures"
 
 
-def test_a_page_does_not_grow_with_the_runs(tmp_path):
+def test_page_of_a_campaign_does_not_grow_with_the_runs(tmp_path):
     def size(seeds):
         folder = write_campaign(tmp_path / str(seeds), {"radio.loss": [0.0, 0.3, 0.6]}, range(seeds))
         return len(page(campaign_report(CampaignFolder(folder), ["order"])))
@@ -359,7 +359,7 @@ def test_true_and_lists_are_names():
     assert (levels.labels, levels.number) == (("true", "[1, 2.5]", "null"), None)
 
 
-def test_as_many_values_as_can_be_shown_stay_apart():
+def test_levels_up_to_the_maximum_stay_apart():
     levels = levels_of("x", tuple({"x": x} for x in range(MAX_LEVELS)))
     assert (len(levels), levels.means) == (MAX_LEVELS, ())
 
@@ -450,7 +450,7 @@ def test_resilience_and_scaling_are_drawn_of_a_few_points():
         ([np.nan, 5.0], False),
     ],
 )
-def test_an_axis_is_logarithmic_for_positive_values_over_decades(values, logarithmic):
+def test_axis_is_logarithmic_for_positive_values_over_decades(values, logarithmic):
     assert fits_log(np.array(values)) == logarithmic
 
 
@@ -467,7 +467,7 @@ def browser():
     pytest.skip("needs chromium")
 
 
-def test_nothing_reaches_beyond_a_phones_screen(tmp_path, browser):
+def test_page_of_a_campaign_fits_a_phones_screen(tmp_path, browser):
     vary = {"radio.loss": [0.0, 0.2, 0.4, 0.6], "robots.a-group-of-a-long-name.count": [5, 10, 20]}
     folder = write_campaign(tmp_path / "a", vary, (1, 2, 3), failed=(1,), missing=(2,), name="A" * 90)
     text = page(campaign_report(CampaignFolder(folder), ["order", "aggregation_time_s"]))
@@ -479,7 +479,7 @@ def test_nothing_reaches_beyond_a_phones_screen(tmp_path, browser):
     assert f"is {PHONE_PX} of {PHONE_PX} px, beyond: </body>" in ended.stdout
 
 
-def test_the_share_of_runs_is_drawn_with_its_intervals():
+def test_share_curve_is_drawn_with_its_intervals():
     intervals = [Interval(0.7225, 1.0), Interval(0.2366, 0.7634)]
     axes = share_curve(np.array([0.0, 0.5]), np.array([1.0, 0.5]), intervals, "what", "x").axes[0]
     np.testing.assert_allclose(axes.lines[0].get_xydata(), [[0.0, 1.0], [0.5, 0.5]])
@@ -490,7 +490,7 @@ def test_the_share_of_runs_is_drawn_with_its_intervals():
 
 
 @pytest.mark.parametrize(("place", "side"), [(0.1, "left"), (0.95, "right")])
-def test_the_number_of_a_change_point_stays_within_the_figure(place, side):
+def test_change_point_label_stays_within_the_figure(place, side):
     x = np.array([0.0, 0.5, 1.0])
     line = MedianLine("a", x, x, x, x, x, x, Jump(place, place, place))
     figure = response_curve([line], "what", "x")

@@ -58,7 +58,7 @@ def names(report):
     return [figure.name for figure in report.figures]
 
 
-def test_a_run_with_all_tables_has_every_figure_and_the_numbers_of_its_summary(tmp_path):
+def test_report_of_all_tables_has_every_figure_and_numbers_of_the_summary(tmp_path):
     folder = run_folder(tmp_path, static(6), ticks(DISK, static(6), 3, count=30), packets=1.0, links=True)
     report = run_report(folder)
     assert names(report) == ["timeline", "trajectories", "metrics", "delivery-by-distance", "latency", "links"]
@@ -93,14 +93,14 @@ def test_links_come_from_packets_where_they_were_not_counted(tmp_path):
     assert names(report)[-1] == "links"
 
 
-def test_a_run_without_a_radio_says_so(tmp_path):
+def test_report_of_a_run_without_a_radio_says_so(tmp_path):
     of = static(4, radio=False)
     report = run_report(run_folder(tmp_path, of, wandering(of, 12)))
     assert names(report) == ["timeline", "trajectories", "metrics"]
     assert "no radio" in texts(report)
 
 
-def test_of_several_arenas_the_first_is_drawn_and_tables_are_of_all(tmp_path):
+def test_report_of_several_arenas_draws_the_first_and_tabulates_all(tmp_path):
     of = static(5, arenas=3)
     report = run_report(run_folder(tmp_path, of, ticks(DISK, of, 4, count=20), links=True))
     assert "first of 3 arenas, seed 1" in texts(report)
@@ -114,7 +114,7 @@ def test_of_several_arenas_the_first_is_drawn_and_tables_are_of_all(tmp_path):
     assert table(report, "Fates of packets in 3 arenas")["received"][0] == f"{received:,}"
 
 
-def test_a_killed_run_is_reported_up_to_its_last_tick(tmp_path):
+def test_report_of_a_killed_run_reaches_to_its_last_tick(tmp_path):
     of = static(6)
     seen = list(ticks(DISK, of, 3, count=30))
     (tmp_path / "killed").mkdir()
@@ -131,7 +131,7 @@ def test_a_killed_run_is_reported_up_to_its_last_tick(tmp_path):
         assert {key: pytest.approx(value, nan_ok=True) for key, value in expected.items()} == values, name
 
 
-def test_a_run_without_a_tick_is_reported_too(tmp_path):
+def test_report_of_a_run_without_a_tick_has_no_figures(tmp_path):
     report = run_report(run_folder(tmp_path, static(2), [], summary=False))
     assert names(report) == []
     assert "No tick" in texts(report)
@@ -139,7 +139,7 @@ def test_a_run_without_a_tick_is_reported_too(tmp_path):
 
 
 @pytest.mark.parametrize("radio", [True, False])
-def test_a_robot_alone_has_a_report(tmp_path, radio):
+def test_report_of_a_lone_robot_exists_with_and_without_a_radio(tmp_path, radio):
     of = static(1, radio=radio)
     silent = {"departed": departed([]), "finished": links([], [], 0, 0), "tally": tally({})} if radio else {}
     report = run_report(run_folder(tmp_path, of, wandering(of, 9, **silent), links=True))
@@ -147,7 +147,7 @@ def test_a_robot_alone_has_a_report(tmp_path, radio):
     assert ("no two robots were in range" in texts(report)) == radio
 
 
-def test_what_users_name_is_escaped(tmp_path):
+def test_names_with_markup_are_escaped_in_a_report(tmp_path):
     of = replace(static(3), name="<script>alert(1)</script>", robot_names=("<b>", "&", "$x_1$"))
     html = page(run_report(run_folder(tmp_path, of, ticks(DISK, of, 3), links=True)))
     assert "<script" not in html
@@ -155,7 +155,7 @@ def test_what_users_name_is_escaped(tmp_path):
     assert "&lt;script&gt;" in html
 
 
-def test_a_damaged_table_costs_its_figure_and_is_named(tmp_path):
+def test_damaged_table_costs_its_figure_and_is_named(tmp_path):
     folder = run_folder(tmp_path, static(6), ticks(DISK, static(6), 3), packets=1.0, links=True)
     for name in ("radio_distances", "radio_links"):
         file = folder / f"{name}.parquet"
@@ -176,7 +176,7 @@ def test_events_are_listed_with_the_robots_that_they_changed(tmp_path):
     assert table(report, "All events") == {"0.1": ("kill", "flock-1, flock-2")}
 
 
-def test_what_stopped_a_run_and_the_times_that_metrics_wait_for_are_marked(tmp_path, monkeypatch):
+def test_stop_of_a_run_and_times_of_metrics_are_marked_in_a_report(tmp_path, monkeypatch):
     of, drawn = static(3), []
     folder = run_folder(tmp_path, of, wandering(of, 20), ended="stopped")
     summary = json.loads((folder / "summary.json").read_text())
@@ -203,7 +203,7 @@ def test_what_stopped_a_run_and_the_times_that_metrics_wait_for_are_marked(tmp_p
     assert about["ended"] == ("stopped: order at least 0.1 for 1 s, since 0.7 s",)
 
 
-def test_a_run_in_real_time_has_the_lateness_of_its_ticks_deliveries_and_frames(tmp_path):
+def test_lateness_of_a_real_time_run_is_reported(tmp_path):
     folder = run_folder(tmp_path, static(3), wandering(static(3), 6))
     summary = json.loads((folder / "summary.json").read_text())
     delays = {"count": 1500, "p50_s": 0.0011, "p99_s": 0.0029, "worst_s": 0.0071}
@@ -229,12 +229,12 @@ def test_a_run_in_real_time_has_the_lateness_of_its_ticks_deliveries_and_frames(
     assert "Lateness" in page(report)
 
 
-def test_a_run_in_lockstep_has_no_section_on_real_time(tmp_path):
+def test_lockstep_run_has_no_section_on_real_time(tmp_path):
     report = run_report(run_folder(tmp_path, static(3), wandering(static(3), 6)))
     assert "Real time" not in [section.title for section in report.sections]
 
 
-def test_of_a_metric_of_the_users_own_what_the_run_kept_of_it_counts(tmp_path):
+def test_custom_metric_is_reported_by_its_recorded_facts(tmp_path):
     of = static(3)
     folder = run_folder(tmp_path, of, wandering(of, 20), summary=False)
     gas = MetricInfo("gas", "what it smells of", "ppm", "count", (0.0, None))
@@ -257,7 +257,7 @@ def test_of_a_metric_of_the_users_own_what_the_run_kept_of_it_counts(tmp_path):
     assert shown.title == "gas (ppm)"
 
 
-def test_what_is_no_run_folder_is_refused(tmp_path):
+def test_folder_without_a_run_is_refused_by_a_report(tmp_path):
     for folder, where in ((tmp_path / "none", tmp_path / "none"), (tmp_path, tmp_path / "static.json")):
         with pytest.raises(BadInput, check=lambda error, where=where: error.where == str(where)):
             run_report(folder)
@@ -294,7 +294,7 @@ def events(*rows):
     return pl.DataFrame([dict(zip(names, row, strict=True)) for row in rows], infer_schema_length=None)
 
 
-def test_an_end_belongs_to_the_first_open_occurrence_of_the_same_robots():
+def test_event_end_belongs_to_the_first_open_event_of_the_same_robots():
     kill, motors = Lane("kill"), Lane("fail motors")
     kill.spans, kill.robots = [Span(1.0, 6.0), Span(2.0, 5.0)], {"a", "b"}
     motors.spans, motors.robots = [Span(3.0, None)], {"c"}
@@ -322,7 +322,7 @@ def test_thinned_curves_keep_their_peaks_and_gaps():
     assert thinned(np.zeros(7), 7).tolist() == list(range(7))
 
 
-def test_every_place_is_drawn_of_a_small_run():
+def test_trajectories_of_a_small_run_have_every_position():
     of = two_groups()
     place_m = np.random.default_rng(1).uniform(-3, 3, (30, 3, 2))
     paths = paths_of(place_m, of)
@@ -343,7 +343,7 @@ def test_on_a_torus_the_pen_is_lifted_at_the_seam():
     np.testing.assert_array_equal(known, [2.0, 3.0, 3.9, np.nan, -3.5, -3.0])
 
 
-def test_of_long_runs_of_many_robots_some_are_drawn_from_start_to_end():
+def test_trajectories_of_large_runs_are_thinned_from_start_to_end():
     place_m = np.zeros((600, 3000, 2), np.float32)
     paths = paths_of(place_m, replace(two_groups()))
     assert len(paths.robots) == MAX_PATHS
@@ -430,7 +430,7 @@ def test_links_add_up_to_the_account_of_the_radio(tmp_path):
     assert in_range.sum() == rows - fates[Fate.BLOCKED] > 0
 
 
-def test_a_matrix_has_a_square_for_each_link_and_names_for_few_robots():
+def test_link_matrix_has_a_square_per_link_and_names_of_few_robots():
     pdr = np.array([[np.nan, 0.25], [1.0, np.nan]])
     axes = link_matrix(replace(static(2), robot_names=("left", "a-very-long-name")), pdr).axes[0]
     shown = axes.images[0].get_array()

@@ -75,7 +75,7 @@ def text_of(folder, part):
     return next(finding.text for finding in verify(folder) if finding.part == part)
 
 
-def test_a_whole_folder_has_nothing_wrong_and_is_left_as_it_is(tmp_path):
+def test_whole_run_folder_has_no_fault_and_is_unchanged_by_verify(tmp_path):
     fill(tmp_path)
     before = {path: path.read_bytes() for path in tmp_path.rglob("*")}
     findings = verify(tmp_path)
@@ -107,7 +107,7 @@ def test_a_whole_folder_has_nothing_wrong_and_is_left_as_it_is(tmp_path):
         ("events.parquet", {"events": TableState.MISSING}),
     ],
 )
-def test_what_is_missing_is_named(tmp_path, gone, wrong):
+def test_missing_file_of_a_run_folder_is_named(tmp_path, gone, wrong):
     fill(tmp_path)
     (tmp_path / gone).unlink()
     assert states(tmp_path) == wrong
@@ -115,7 +115,7 @@ def test_what_is_missing_is_named(tmp_path, gone, wrong):
 
 @pytest.mark.parametrize("part", ["summary.json", "static.json", "ticks.parquet", "packets.parquet", "events.parquet"])
 @pytest.mark.parametrize("cut", [0.0, 0.5, 0.98])
-def test_what_was_cut_off_is_damaged(tmp_path, part, cut):
+def test_truncated_file_of_a_run_folder_is_damaged(tmp_path, part, cut):
     fill(tmp_path)
     whole = (tmp_path / part).read_bytes()
     (tmp_path / part).write_bytes(whole[: int(cut * len(whole))])
@@ -143,7 +143,7 @@ def killed(folder, monkeypatch, in_chunk=3):
     (folder / "ticks" / "part-000003.parquet").unlink()  # the last tick's
 
 
-def test_of_a_killed_run_it_says_up_to_where_it_can_be_read(tmp_path, monkeypatch):
+def test_killed_runs_tables_are_partial_up_to_their_last_part(tmp_path, monkeypatch):
     killed(tmp_path, monkeypatch)
     (tmp_path / "ticks" / ".aside-part-000003.parquet").write_bytes(b"PAR1 half of it")
     partial = dict.fromkeys(("ticks", "packets", "events", "trajectory.digests"), TableState.PARTIAL)
@@ -151,7 +151,7 @@ def test_of_a_killed_run_it_says_up_to_where_it_can_be_read(tmp_path, monkeypatc
     assert "up to tick 8 (0.8 s); 3 parts" in text_of(tmp_path, "ticks")
 
 
-def test_a_run_killed_before_its_first_part_left_nothing(tmp_path, monkeypatch):
+def test_killed_run_without_a_first_part_is_partial(tmp_path, monkeypatch):
     killed(tmp_path, monkeypatch)
     for part in (tmp_path / "ticks").iterdir():
         part.unlink()
@@ -166,7 +166,7 @@ def test_parts_left_beside_the_whole_table_are_no_fault(tmp_path):
     assert "parts" in text_of(tmp_path, "ticks")
 
 
-def test_a_part_that_is_damaged_or_gone_is_named(tmp_path, monkeypatch):
+def test_damaged_or_missing_part_is_named(tmp_path, monkeypatch):
     killed(tmp_path, monkeypatch)
     broken = tmp_path / "ticks" / "part-000001.parquet"
     broken.write_bytes(broken.read_bytes()[:100])
@@ -204,7 +204,7 @@ def test_tables_that_differ_from_the_summary_are_found(tmp_path, change, part, h
     assert all(hint in text_of(tmp_path, part) for hint in hints)
 
 
-def test_an_arena_too_few_is_found(tmp_path):
+def test_missing_arena_in_a_table_is_found(tmp_path):
     fill(tmp_path)
     pl.read_parquet(tmp_path / "ticks.parquet").filter(pl.col("arena") == 0).write_parquet(tmp_path / "ticks.parquet")
     assert states(tmp_path) == {"ticks": TableState.DIFFERS}
@@ -237,13 +237,13 @@ def test_copied_files_are_compared_with_their_sha256(tmp_path):
     assert states(tmp_path) == {"agent.py": TableState.DIFFERS, "body.toml": TableState.MISSING}
 
 
-def test_what_is_no_run_folder_is_refused(tmp_path):
+def test_folder_without_a_run_is_refused_by_verify(tmp_path):
     for folder in (tmp_path, tmp_path / "nowhere"):
         with pytest.raises(BadInput, check=lambda error, folder=folder: error.where == str(folder)):
             verify(folder)
 
 
-def test_a_recording_is_read_to_its_end(tmp_path):
+def test_recording_is_verified_to_its_end(tmp_path):
     pytest.importorskip("rerun", reason="needs the extra [view]")
     from tests.support.metrics import recordings
 
@@ -279,13 +279,13 @@ def test_without_rerun_a_recording_is_only_seen(tmp_path, monkeypatch):
         ("trajectory.digests", bytes(8 * TICKS), TableState.DIFFERS),
     ],
 )
-def test_what_says_something_else_is_found(tmp_path, name, content, state):
+def test_file_with_other_contents_is_found(tmp_path, name, content, state):
     fill(tmp_path)
     (tmp_path / name).write_bytes(content)
     assert states(tmp_path)[name] == state
 
 
-def test_a_table_at_which_the_reader_itself_breaks_is_damaged(tmp_path, monkeypatch):
+def test_table_that_crashes_the_reader_is_damaged(tmp_path, monkeypatch):
     def breaks(*_):
         raise pl.exceptions.PanicException("assertion failed: offset + length <= self.length")
 
@@ -297,7 +297,7 @@ def test_a_table_at_which_the_reader_itself_breaks_is_damaged(tmp_path, monkeypa
     assert states(tmp_path)["ticks"] == TableState.DAMAGED
 
 
-def test_a_folder_in_place_of_a_file_is_damage(tmp_path):
+def test_folder_in_place_of_a_file_is_damaged(tmp_path):
     fill(tmp_path)
     for name in ("summary.json", "run.json", "trajectory.digests", "log.txt"):
         (tmp_path / name).unlink()
@@ -308,7 +308,7 @@ def test_a_folder_in_place_of_a_file_is_damage(tmp_path):
     ] * 4
 
 
-def test_a_table_of_other_columns_is_damaged(tmp_path):
+def test_table_with_other_columns_is_damaged(tmp_path):
     fill(tmp_path)
     pl.DataFrame({"x": [1]}).write_parquet(tmp_path / "packets.parquet")
     assert states(tmp_path) == {"packets": TableState.DAMAGED}
@@ -327,7 +327,7 @@ def test_inputs_are_compared_with_the_summary(tmp_path):
     assert states(tmp_path) == {"inputs/actions.frames": TableState.DIFFERS}
 
 
-def test_a_recording_that_was_made_and_is_gone_is_missing(tmp_path):
+def test_recording_that_was_made_and_is_gone_is_missing(tmp_path):
     recorded = {"rows": TICKS, "dropped": 0}
     fill(tmp_path, share=0.0, record={"ticks": recorded, "events": recorded, "rrd": recorded})
     assert states(tmp_path) == {"run.rrd": TableState.MISSING}

@@ -38,7 +38,7 @@ def strict():
     rerun.set_strict_mode(False)
 
 
-def test_a_recording_holds_the_positions_and_headings_of_the_first_arena(tmp_path):
+def test_recording_holds_positions_and_headings_of_the_first_arena(tmp_path):
     of = static(3, arenas=2, obstacles=OBSTACLES)
     ticks = list(moving(of, 40, edges=edges((0, 1), (4, 5))))
     record(tmp_path / "run.rrd", of, ticks)
@@ -182,7 +182,7 @@ def test_keys_of_plots_name_each_line_in_its_colour(tmp_path):
     }
 
 
-def test_a_legend_says_how_many_classes_it_has_no_line_for_and_has_letters_for_all(tmp_path):
+def test_legend_counts_the_classes_it_omits_and_draws_any_letters(tmp_path):
     of, states = static(3), ("", "\u2192 caf\u00e9", *(f"state {i}" for i in range(20)))
     ticks = [truth(of, tick, state=np.full(3, tick + 1), states=states) for tick in range(10)]
     record(tmp_path / "run.rrd", of, ticks)
@@ -268,7 +268,7 @@ def test_events_of_the_first_arena_are_told_and_marked_where_they_take_effect(tm
     assert list(column(tmp_path / "run.rrd", "/plots/shares/event", "Scalars:scalars")) == [1, 3]
 
 
-def test_an_entity_is_sent_at_once_for_all_ticks_of_two_seconds_of_the_clock(tmp_path, monkeypatch):
+def test_recording_sends_each_entity_once_per_two_seconds(tmp_path, monkeypatch):
     calls = []
     for name in ("log", "send_columns"):
         original = getattr(rerun.RecordingStream, name)
@@ -294,7 +294,7 @@ def test_an_entity_is_sent_at_once_for_all_ticks_of_two_seconds_of_the_clock(tmp
     recording.end(None)
 
 
-def test_what_is_much_is_sent_before(tmp_path, monkeypatch):
+def test_recording_sends_earlier_when_much_is_buffered(tmp_path, monkeypatch):
     monkeypatch.setattr("swarmwire.metrics.pictures.viewer.recording.RerunRecording._send_bytes", 10_000)
     record(tmp_path / "run.rrd", static(100), moving(static(100), 20))
     chunks = rerun.chunk.RrdReader(str(tmp_path / "run.rrd")).stream().filter(content="/world/headings")
@@ -307,7 +307,7 @@ def test_what_is_much_is_sent_before(tmp_path, monkeypatch):
     assert len(rows) > 3
 
 
-def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, monkeypatch):
+def test_recording_is_closed_when_an_entity_fails_at_its_end(tmp_path, monkeypatch):
     of, metrics = static(3), Metrics()
     recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
     watch(of, moving(of, 4), metrics, recording)
@@ -319,7 +319,7 @@ def test_a_recording_is_closed_also_where_an_entity_fails_at_its_end(tmp_path, m
     assert list(column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")) == [0, 1, 2, 3]
 
 
-def test_a_recording_that_failed_while_it_began_is_closed(tmp_path, monkeypatch):
+def test_recording_that_failed_at_its_begin_is_closed(tmp_path, monkeypatch):
     recording = RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
     monkeypatch.setattr("swarmwire.metrics.pictures.viewer.layout.about", refuse)
     with pytest.raises(ValueError, match="refused"):
@@ -342,7 +342,7 @@ def view_names(path):
 
 
 @pytest.mark.parametrize(("radio", "size_m"), [(True, (8.0, 6.0)), (True, (2.0, 9.0)), (False, (8.0, 6.0))])
-def test_it_opens_with_named_views_of_all_that_was_recorded(tmp_path, radio, size_m):
+def test_recording_opens_with_named_views_of_its_contents(tmp_path, radio, size_m):
     of = replace(static(2, radio=radio), arena_size_m=size_m)
     record(tmp_path / "run.rrd", of, moving(of, 1))
     names = view_names(tmp_path / "run.rrd")
@@ -350,7 +350,7 @@ def test_it_opens_with_named_views_of_all_that_was_recorded(tmp_path, radio, siz
     assert len(names) == (17 if radio else 11)  # each plot has a view with the names of its lines
 
 
-def test_a_recording_has_no_wall_clock_time_and_equal_runs_have_equal_contents(tmp_path):
+def test_recording_has_no_wall_clock_and_is_equal_for_equal_runs(tmp_path):
     of = static(3, obstacles=OBSTACLES)
     contents = []
     for path in (tmp_path / "a.rrd", tmp_path / "b.rrd"):
@@ -364,7 +364,7 @@ def test_a_recording_has_no_wall_clock_time_and_equal_runs_have_equal_contents(t
     assert len(contents[0]) > 20
 
 
-def test_a_run_without_a_radio_has_no_links_and_no_plot_of_packets(tmp_path):
+def test_recording_without_a_radio_has_neither_links_nor_packets(tmp_path):
     of = static(3, radio=False)
     record(tmp_path / "run.rrd", of, moving(of, 3))
     assert column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips") == {}
@@ -398,7 +398,7 @@ def test_movable_obstacles_are_drawn_where_they_are_in_each_tick(tmp_path):
     assert np.allclose(found[1], [[[1.5, 0.0], [1.5, 2.0], [0.5, 2.0], [0.5, 0.0], [1.5, 0.0]]])
 
 
-def test_the_floor_is_one_picture_below_all_else(tmp_path):
+def test_floor_is_one_picture_in_a_recording(tmp_path):
     of = replace(static(2), floor=Floor(1.0, (Patch("disc", 4.0, 3.0, 0.0, radius_m=1.0),)))
     record(tmp_path / "run.rrd", of, moving(of, 2))
     (buffer,) = column(tmp_path / "run.rrd", "/world/floor", "Image:buffer").values()
@@ -416,7 +416,7 @@ def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
         RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
 
 
-def test_where_there_is_no_room_it_fails_at_once_and_leaves_no_file(tmp_path):
+def test_recording_without_room_fails_at_once_and_leaves_no_file(tmp_path):
     resource = pytest.importorskip("resource", reason="needs limits as Unix has them")
     recording = RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -453,7 +453,7 @@ def picture(rrd, name, at_s=None):
     return png.read_bytes()
 
 
-def test_a_picture_has_the_size_asked_for_and_shows_the_time_asked_for(rrd):
+def test_picture_of_a_recording_has_the_given_size_and_time(rrd):
     last_s = 19 / static(3).rate_hz
     first, last, end = picture(rrd, "0.png", 0.0), picture(rrd, "19.png", last_s), picture(rrd, "end.png")
     assert struct.unpack(">II", first[16:24]) == (640, 360)
@@ -461,7 +461,7 @@ def test_a_picture_has_the_size_asked_for_and_shows_the_time_asked_for(rrd):
     assert last == end
 
 
-def test_a_machine_without_a_driver_is_told_what_it_lacks(rrd, monkeypatch):
+def test_picture_without_a_graphics_driver_is_refused_with_the_remedy(rrd, monkeypatch):
     monkeypatch.setenv("VK_ICD_FILENAMES", "/dev/null")
     monkeypatch.setenv("VK_DRIVER_FILES", "/dev/null")
     with pytest.raises(NoGraphics, match="mesa-vulkan-drivers"):
@@ -469,18 +469,18 @@ def test_a_machine_without_a_driver_is_told_what_it_lacks(rrd, monkeypatch):
 
 
 @pytest.mark.parametrize("tick", [-1, 20])
-def test_a_time_that_was_not_recorded_is_refused(rrd, tick):
+def test_picture_at_a_time_that_was_not_recorded_is_refused(rrd, tick):
     with pytest.raises(BadInput, check=lambda error: error.where == "--at" and "recorded" in error.expected):
         picture(rrd, "none.png", tick / static(3).rate_hz)
 
 
-def test_a_recording_that_is_not_there_is_refused(tmp_path):
+def test_picture_of_a_missing_recording_is_refused(tmp_path):
     with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "none.rrd")):
         render_png(tmp_path / "none.rrd", tmp_path / "none.png")
 
 
 @pytest.mark.parametrize("name", ["x.txt", "x", "x.jpg"])
-def test_what_is_no_png_by_name_is_refused(rrd, name):
+def test_picture_not_named_png_is_refused(rrd, name):
     with pytest.raises(BadInput, check=lambda error: error.where == str(rrd.with_name(name))):
         render_png(rrd, rrd.with_name(name))
     assert not rrd.with_name(name).exists()
