@@ -34,14 +34,14 @@ def pixels(path):
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda path: path.stem)
-def test_every_scenario_can_be_drawn(here, scenario):
+def test_scenario_drawing_exists_for_every_shipped_scenario(here, scenario):
     assert draw(scenario) == f"written: {scenario.stem}.png\n"
     image = pixels(here / f"{scenario.stem}.png")
     assert max(image.shape) == 1280
     assert (image == E_PUCK_BLUE).all(axis=2).any()
 
 
-def test_the_floor_is_drawn_in_greys(here):
+def test_floor_is_drawn_in_greys(here):
     draw(ROOT / "scenarios" / "maze.toml", "--to", "maze.png")
     spot = (pixels(here / "maze.png") == round(255 * (0.45 + 0.55 * 0.2))).all(axis=2)
     assert spot.sum() > 1000
@@ -75,7 +75,7 @@ def test_bodies_are_drawn_by_name_and_by_data_sheet(here):
     assert pixels(here / "wide.png").shape[1] == 900
 
 
-def test_a_picture_may_be_of_lines(here):
+def test_drawing_may_be_svg(here):
     draw("footbot", "--to", "a.svg")
     assert "</svg>" in (here / "a.svg").read_text()
 
@@ -93,7 +93,7 @@ def test_a_picture_may_be_of_lines(here):
         (["thin.toml"], "thin.toml: radius_m", "-1.0"),
     ],
 )
-def test_what_cannot_be_drawn_is_refused(here, arguments, place, expected):
+def test_draw_arguments_that_are_invalid_are_refused(here, arguments, place, expected):
     (here / "thin.toml").write_text('like = "epuck"\nradius_m = -1\n')
     with pytest.raises(BadInput) as error:
         draw(*arguments)

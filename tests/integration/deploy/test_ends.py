@@ -130,7 +130,9 @@ def hang_up(process: subprocess.Popen[str]) -> None:
     ],
     ids=["a runner is killed", "the agent host and all runners are", "Ctrl-C", "the terminal hangs up"],
 )
-def test_it_ends_in_order_with_a_summary_and_whole_records(long_run, tmp_path, act: Act, code, said, ended):
+def test_run_that_is_killed_or_hung_up_ends_with_summary_and_whole_records(
+    long_run, tmp_path, act: Act, code, said, ended
+):
     process, children = long_run
     act(process)
     output, errors = process.communicate(timeout=GONE_S + 5)
@@ -153,7 +155,7 @@ def playing(folder: Path, name: str) -> list[str]:
     return ["--set", f"robots.flock.agent={agent}:{name}", "--set", "robots.flock.params={}", "--runners", "2"]
 
 
-def test_an_agent_may_print_and_one_that_raises_ends_the_run_with_its_name_and_traceback(tmp_path):
+def test_agent_may_print_and_one_that_raises_ends_the_run_with_a_traceback(tmp_path):
     ended = swarmwire("run", LOSSY, *playing(tmp_path, "Faulty"), "--out", tmp_path / "run", "--quiet")
     assert ended.returncode == 1
     assert "the agent of flock-" in ended.stderr
@@ -162,7 +164,7 @@ def test_an_agent_may_print_and_one_that_raises_ends_the_run_with_its_name_and_t
     assert "hello from an agent" in ended.stdout + ended.stderr
 
 
-def test_an_interrupt_ends_a_run_that_waits_for_an_agent(tmp_path):
+def test_interrupt_ends_a_run_that_waits_for_an_agent(tmp_path):
     process = started(LOSSY, *playing(tmp_path, "Stuck"), "--out", tmp_path / "run")
     children = family(process)
     process.send_signal(signal.SIGINT)
@@ -182,7 +184,7 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
-def test_what_a_killed_run_left_is_readable_and_true(tmp_path, whole, moment):
+def test_killed_run_leaves_a_readable_and_true_folder(tmp_path, whole, moment):
     process = started_in_haste(tmp_path, DURATION, KILL)
     with process:
         assert process.stdout is not None
@@ -224,7 +226,7 @@ def killed(tmp_path_factory):
         return folder, before, max(*seen, *ticks)
 
 
-def test_a_killed_run_leaves_its_recording_up_to_the_last_period(killed):
+def test_killed_run_leaves_its_recording_up_to_the_last_period(killed):
     pytest.importorskip("rerun", reason="needs the extra [view]")
     folder, before, last = killed
     state, told = check_recording(folder / "run.rrd")
@@ -284,7 +286,7 @@ class Vandal(Observer):
             list(session.get(self.keys.join("x"), payload=b"let me in", timeout=0.1))
 
 
-def test_a_stranger_cannot_stop_or_change_a_run(tmp_path, monkeypatch):
+def test_stranger_cannot_stop_or_change_a_run(tmp_path, monkeypatch):
     path = tmp_path / "s"
     monkeypatch.setattr(backends, "local_endpoint", lambda: nullcontext(unix_endpoint(str(path))))
     simulation = Simulation(LOSSY, overrides=["duration_s=2"], runners=3)

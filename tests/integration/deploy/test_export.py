@@ -83,7 +83,7 @@ def pixels(path):
         return np.asarray(image.convert("RGB"))
 
 
-def test_a_picture_is_of_the_end_unless_a_time_is_named(run, tmp_path):
+def test_picture_is_of_the_end_unless_a_time_is_given(run, tmp_path):
     assert export(run, *SMALL).startswith(f"written: {run}/picture.png (")
     end = pixels(run / "picture.png")
     assert max(end.shape) == 200
@@ -92,7 +92,7 @@ def test_a_picture_is_of_the_end_unless_a_time_is_named(run, tmp_path):
         assert np.array_equal(pixels(tmp_path / f"{name}.png"), end) == same
 
 
-def test_a_table_holds_the_metrics_over_time(run, tmp_path):
+def test_table_export_holds_the_metrics_over_time(run, tmp_path):
     of, to = film(ticks=30), tmp_path / "metrics.csv"
     assert export(run, "--to", to) == f"written: {to} (30 rows)\n"
     table = pl.read_csv(to)
@@ -105,7 +105,7 @@ def test_a_table_holds_the_metrics_over_time(run, tmp_path):
     assert part["time_s"].to_list() == [at_s for at_s in of.time_s.tolist() if 1.0 <= at_s <= 2.0]
 
 
-def test_a_gif_lasts_as_long_as_the_run_and_says_what_it_is(run):
+def test_gif_lasts_as_long_as_the_run_and_prints_its_frames(run):
     from PIL import Image
 
     told = export(run, "--to", run / "film.gif", *SMALL)
@@ -116,7 +116,7 @@ def test_a_gif_lasts_as_long_as_the_run_and_says_what_it_is(run):
         assert gif.info["duration"] == 100
 
 
-def test_an_mp4_is_of_the_time_and_speed_asked_for(run, tmp_path):
+def test_mp4_is_of_the_given_time_and_speed(run, tmp_path):
     import imageio_ffmpeg
 
     to = tmp_path / "a.mp4"
@@ -125,7 +125,7 @@ def test_an_mp4_is_of_the_time_and_speed_asked_for(run, tmp_path):
     assert imageio_ffmpeg.count_frames_and_secs(str(to)) == (11, pytest.approx(2.2))
 
 
-def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
+def test_export_of_a_killed_run_reaches_to_its_last_part(run):
     from PIL import Image
 
     whole = run / "ticks.parquet"
@@ -155,7 +155,7 @@ def test_a_run_that_was_killed_is_exported_up_to_its_last_part(run):
         (["--to", "a.gif", "--size", "5"], "--size", "100 to 8000 pixels"),
     ],
 )
-def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run, monkeypatch, arguments, place, expected):
+def test_export_options_that_are_invalid_are_refused(run, monkeypatch, arguments, place, expected):
     monkeypatch.chdir(run)
     with pytest.raises(BadInput) as error:
         export(run, *arguments)
@@ -164,7 +164,7 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run, monkeypatch,
     assert [path.name for path in run.iterdir()] == ["ticks.parquet"]
 
 
-def test_a_film_that_fails_half_way_leaves_the_one_before(run, monkeypatch):
+def test_film_that_fails_half_way_leaves_the_one_before(run, monkeypatch):
     from swarmwire.metrics.pictures.drawing.animation import FilmFigure
 
     export(run, "--to", run / "film.mp4", *SMALL)
@@ -205,7 +205,7 @@ def exported(folder: Path, to: Path, *options: str) -> Capture:
 
 
 @pytest.mark.parametrize("preset", HEADERS)
-def test_a_capture_holds_each_packet_on_air_once_with_headers_and_payload(folders, tmp_path, preset):
+def test_capture_holds_each_packet_on_air_once_with_headers_and_payload(folders, tmp_path, preset):
     found, packets = exported(folders[preset], tmp_path / "t.pcapng"), RunFolder(folders[preset]).packets()
     link_type, header_bytes = HEADERS[preset]
     on_air = packets.drop_nulls("receiver").unique(["sender", "sequence"]).sort("on_air_at_ns", "sender", "sequence")
@@ -219,7 +219,7 @@ def test_a_capture_holds_each_packet_on_air_once_with_headers_and_payload(folder
     assert comments[0].endswith("to all: Heading, packet 0")
 
 
-def test_a_capture_can_be_of_a_part_of_the_run(folders, tmp_path):
+def test_capture_can_be_of_a_part_of_the_run(folders, tmp_path):
     whole = exported(folders["ieee802154"], tmp_path / "whole.pcapng")
     part = exported(folders["ieee802154"], tmp_path / "part.pcapng", "--from", "0.1", "--until", "0.3")
     kept = [one for one in whole.packets if 100_000_000 <= one.at_ns < 300_000_000]
@@ -243,13 +243,13 @@ def test_tshark_reads_every_frame_and_finds_no_fault(folders, tmp_path, preset):
 
 
 @pytest.mark.parametrize(("options", "option"), FAULTS)
-def test_what_does_not_fit_a_capture_is_refused(folders, tmp_path, options, option):
+def test_capture_options_that_do_not_fit_are_refused(folders, tmp_path, options, option):
     with pytest.raises(BadInput, match=f"^{option}: expected "):
         exported(folders["argos-rab"], tmp_path / "t.pcapng", *options)
     assert not list(tmp_path.iterdir())
 
 
-def test_the_older_kind_of_capture_is_refused_with_the_name_of_the_newer(folders, tmp_path):
+def test_capture_of_the_older_pcap_kind_is_refused_in_favour_of_pcapng(folders, tmp_path):
     with pytest.raises(BadInput, match=r"t\.pcap: .*\.pcapng"):
         exported(folders["argos-rab"], tmp_path / "t.pcap")
 
@@ -277,7 +277,7 @@ def test_packets_whose_arenas_are_no_numbers_are_refused_in_one_line_with_the_fi
         exported(folder, tmp_path / "t.pcapng")
 
 
-def test_a_run_whose_packets_were_not_recorded_is_refused_with_the_way_out(tmp_path):
+def test_capture_of_a_run_without_packets_is_refused_with_the_remedy(tmp_path):
     run_scenario(SCENARIO, overrides=SHORT, out=tmp_path / "run")
     with pytest.raises(BadInput, match="--packets all"):
         exported(tmp_path / "run", tmp_path / "t.pcapng")

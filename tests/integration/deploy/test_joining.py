@@ -181,7 +181,7 @@ def do(joiners: Joiners, line: str) -> None:
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-def test_who_joins_leaves_or_is_lost(joiners, tmp_path, case):
+def test_runners_that_join_leave_or_are_lost_change_a_run_as_stated(joiners, tmp_path, case):
     joiners.before = case.before
     joiners.first = [tuple(line.split()) for line in case.first]
     joiners.on_change = lambda change: do(joiners, case.upon.get(f"{change.what} {change.runner}", ""))
@@ -230,7 +230,7 @@ def alone(joiners: Joiners, *overrides: str) -> list[str]:
     return run(LOSSY, overrides=[*joiners.overrides, *overrides]).trajectory_sha256
 
 
-def test_who_may_not_join_is_told_why_at_both_ends_and_the_run_goes_on(joiners, tmp_path):
+def test_runner_that_may_not_join_is_told_why_at_both_ends(joiners, tmp_path):
     other = tmp_path / "other.py"
     other.write_text(joiners.agent.read_text() + "\n")
     joiners.first = [("a", "--names", "flock-0")]

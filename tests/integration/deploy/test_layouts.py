@@ -97,25 +97,25 @@ def local() -> Result:
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda path: path.stem)
 @pytest.mark.parametrize("runners", [3, "per-robot"])
-def test_every_main_scenario_runs_alike_in_one_process_and_in_many(scenario, runners):
+def test_scenario_runs_alike_in_one_process_and_in_many(scenario, runners):
     one_second = ["duration_s=1"]
     alone = run(scenario, overrides=one_second).trajectory_sha256
     assert run(scenario, overrides=one_second, runners=runners).trajectory_sha256 == alone
 
 
-def test_a_users_agent_of_the_same_rule_gives_the_same_run(local):
+def test_custom_agent_of_the_same_rule_gives_the_same_run(local):
     mine = f"robots.flock.agent={ROOT / 'examples' / 'flocking_agent.py'}:MyFlocking"
     assert run(LOSSY, overrides=[*SHORT, mine], runners="per-robot").trajectory_sha256 == local.trajectory_sha256
 
 
-def test_an_arena_is_the_same_alone_and_as_one_of_eight(local):
+def test_arena_is_the_same_alone_and_as_one_of_eight(local):
     eight = run(LOSSY, overrides=SHORT, seeds=range(1, 9), runners=3)
     assert eight.trajectory_sha256[0] == local.trajectory_sha256[0]
     assert eight.arenas[0].radio == local.radio
     assert eight.arenas[0].metrics == local.metrics
 
 
-def test_which_runner_plays_which_robots_does_not_matter(local):
+def test_assignment_of_robots_to_runners_does_not_change_the_run(local):
     """Runners get robots in the order in which they come: handing them out backwards is the other order of starting."""
     simulation = Simulation(LOSSY, overrides=SHORT)
     specs = agent_specs(simulation.plan.scenario)
@@ -145,7 +145,7 @@ def scenario(tmp_path: Path) -> Path:
     return tmp_path / "box.toml"
 
 
-def test_a_box_that_is_pushed_between_two_robots_blocks_their_radio(scenario: Path) -> None:
+def test_box_that_is_pushed_between_two_robots_blocks_their_radio(scenario: Path) -> None:
     with Simulation(scenario) as simulation:
         truths = [simulation.step() for _ in range(simulation.plan.ticks)]
     passed = 0
@@ -162,7 +162,7 @@ def test_a_box_that_is_pushed_between_two_robots_blocks_their_radio(scenario: Pa
     assert passed > 5
 
 
-def test_the_record_and_its_pictures_show_it_where_it_is(scenario: Path, tmp_path: Path) -> None:
+def test_movable_box_is_recorded_and_drawn_where_it_is(scenario: Path, tmp_path: Path) -> None:
     out = tmp_path / "run"
     result = run(scenario, out=out, record=Recording(rrd=False))
     assert result.engine == "pymunk"
@@ -231,26 +231,26 @@ def as_bytes(ticks: list[FloatArray | None]) -> list[bytes | None]:
 
 @pytest.mark.parametrize("kind", ["Agreeing", "Turning"])
 @pytest.mark.parametrize("runners", [3, PER_ROBOT])
-def test_they_are_the_same_bit_for_bit_however_the_agents_are_spread(agents: Path, kind: str, runners: int) -> None:
+def test_told_values_are_the_same_in_every_layout_bit_for_bit(agents: Path, kind: str, runners: int) -> None:
     alone, spread = (kept(agents, kind, where, [2]) for where in (None, runners))
     assert as_bytes(spread.values) == as_bytes(alone.values)
     assert alone.values[-1] is not None
     assert np.isfinite(alone.values[-1]).any()
 
 
-def test_they_are_the_same_beside_other_arenas(agents: Path) -> None:
+def test_told_values_are_the_same_beside_other_arenas(agents: Path) -> None:
     alone, beside = (kept(agents, "Agreeing", None, seeds) for seeds in ([2], [5, 2]))
     own = [None if value is None else value[len(value) // 2 :] for value in beside.values]
     assert as_bytes(own) == as_bytes(alone.values)
     assert beside.errors == alone.errors
 
 
-def test_a_consensus_comes_to_less_and_less_disagreement(agents: Path) -> None:
+def test_consensus_reduces_disagreement(agents: Path) -> None:
     errors = kept(agents, "Agreeing", None, [2]).errors
     assert 0.0 < errors[-1] < 0.5 * errors[0]
 
 
-def test_they_are_recorded_from_the_first_on_and_a_repetition_is_the_same(agents: Path, tmp_path: Path) -> None:
+def test_told_values_are_recorded_from_the_first_on_and_repeated(agents: Path, tmp_path: Path) -> None:
     seen, folder = kept(agents, "Turning", 2, [2, 3], tmp_path / "run"), tmp_path / "run"
     assert all(finding.good for finding in verify(folder)), verify(folder)
     table = RunFolder(folder).ticks(1)

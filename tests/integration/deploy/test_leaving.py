@@ -178,7 +178,7 @@ def came_to(result: Result, seed: int) -> tuple[ArenaResult, list[tuple[Any, ...
 
 
 @pytest.mark.parametrize("name", WORLDS)
-def test_an_arena_that_leaves_comes_to_what_it_comes_to_alone(tmp_path: Path, name: str) -> None:
+def test_arena_that_leaves_ends_as_it_does_alone(tmp_path: Path, name: str) -> None:
     path = scenario(tmp_path, name)
     together = packed(path, SEEDS)
     for seed in (1, 5):
@@ -192,7 +192,7 @@ def test_an_arena_that_leaves_comes_to_what_it_comes_to_alone(tmp_path: Path, na
     assert (together.ended, together.ticks) == ("duration", TICKS)
 
 
-def test_the_worlds_above_have_something_to_lose(tmp_path: Path) -> None:
+def test_worlds_with_arenas_that_leave_have_packets_and_faults_to_lose(tmp_path: Path) -> None:
     """Or they would show nothing: something is on its way or waits as arenas leave, and faults are counted."""
     for name in ("unit-disk", "signal"):
         result = packed(scenario(tmp_path, name), SEEDS)
@@ -208,7 +208,7 @@ def test_the_worlds_above_have_something_to_lose(tmp_path: Path) -> None:
     assert happened == {"fail", "run_down", "revive"}
 
 
-def test_a_run_ends_when_its_last_arena_leaves(tmp_path: Path) -> None:
+def test_run_ends_when_its_last_arena_leaves(tmp_path: Path) -> None:
     path = scenario(tmp_path, "unit-disk")
     result = packed(path, (1, 2))
     assert (result.ended, result.ticks, result.sim_time_s) == ("stopped", 17, 1.7)
@@ -242,7 +242,7 @@ class Looks(Observer):
         self.seen.append(truth)
 
 
-def test_in_an_arena_that_left_nobody_lives_moves_sends_or_is_told_anything(tmp_path: Path) -> None:
+def test_robots_of_an_arena_that_left_neither_live_move_nor_send(tmp_path: Path) -> None:
     looks = Looks()
     packed(scenario(tmp_path, "unit-disk"), SEEDS, observers=[looks])
     rows = slice(0, 7)  # of the first arena, which leaves after tick 5
@@ -267,7 +267,7 @@ def test_in_an_arena_that_left_nobody_lives_moves_sends_or_is_told_anything(tmp_
         assert not any(event.changed[rows].any() for event in truth.events)
 
 
-def test_every_metric_ends_where_its_arena_does(tmp_path: Path) -> None:
+def test_metrics_of_an_arena_that_leaves_are_those_of_it_alone(tmp_path: Path) -> None:
     path = scenario(tmp_path, "unit-disk")
     more = [f"metrics={[name for name, kind in METRICS.items() if not kind.standard]}"]
     together = packed(path, SEEDS, overrides=more)
@@ -275,7 +275,7 @@ def test_every_metric_ends_where_its_arena_does(tmp_path: Path) -> None:
         assert came_to(together, seed) == came_to(alone(path, seed, overrides=more), seed)
 
 
-def test_a_record_holds_of_an_arena_what_it_holds_of_one_alone(tmp_path: Path) -> None:
+def test_record_of_an_arena_that_leaves_is_that_of_it_alone(tmp_path: Path) -> None:
     path, what = scenario(tmp_path, "unit-disk"), Recording(packets=1.0, links=True, rrd=False)
     packed(path, (3, 5, 1), out=tmp_path / "together", record=what)
     for at, seed in ((0, 3), (2, 1)):
@@ -289,7 +289,7 @@ def test_a_record_holds_of_an_arena_what_it_holds_of_one_alone(tmp_path: Path) -
     assert RunFolder(tmp_path / "together").ticks().height == 11 + TICKS + 6
 
 
-def test_a_run_that_arenas_left_is_recorded_whole_and_repeated(tmp_path: Path) -> None:
+def test_run_that_arenas_left_is_recorded_whole_and_repeated(tmp_path: Path) -> None:
     result = packed(scenario(tmp_path, "unit-disk"), (5, 1), out=tmp_path / "together")
     assert [found.part for found in verify(tmp_path / "together") if not found.good] == []
     rerun = RepeatedRun(tmp_path / "together")

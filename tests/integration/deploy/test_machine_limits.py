@@ -88,7 +88,7 @@ def assert_names(error, path):
     assert len(error.splitlines()) == 1
 
 
-def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_path):
+def test_run_on_a_full_disk_goes_on_and_its_folder_is_readable(tmp_path):
     disk, left = tmp_path / "disk", tmp_path / "left"
     disk.mkdir()
     if shutil.which("unshare") is None:
@@ -110,7 +110,7 @@ def test_a_run_on_a_disk_that_is_full_goes_on_and_its_folder_is_readable(tmp_pat
     assert TableState.DAMAGED not in states.values()
 
 
-def test_a_table_that_a_full_disk_refuses_is_exit_code_1_and_the_run_goes_on(tmp_path, monkeypatch, capsys):
+def test_table_that_a_full_disk_refuses_is_exit_code_1_and_the_run_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(tables, "write_text", refuses)
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
     assert code == 1
@@ -122,7 +122,7 @@ def test_a_table_that_a_full_disk_refuses_is_exit_code_1_and_the_run_goes_on(tmp
     assert (summary["ended"], summary["counts"]["observer_failed_StaticRecorder"]) == ("duration", 1)
 
 
-def test_a_film_for_which_the_disk_has_no_room_is_one_line(tmp_path):
+def test_film_on_a_full_disk_is_refused_in_one_line(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
     run(LOSSY, overrides=SHORT_RUN, out=tmp_path / "run")
@@ -155,7 +155,7 @@ def test_too_few_addresses_are_one_line_and_nothing_begins(tmp_path, limit_kb, e
     assert not (tmp_path / "run").exists()
 
 
-def test_a_disk_without_room_for_the_summary_costs_nobody_the_result(tmp_path, monkeypatch, capsys):
+def test_summary_on_a_full_disk_costs_nobody_the_result(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(
         folder, "write_text", lambda path, text: (refuses if path.name == SUMMARY else write_text)(path, text)
     )
@@ -166,7 +166,7 @@ def test_a_disk_without_room_for_the_summary_costs_nobody_the_result(tmp_path, m
     assert (tmp_path / "run" / "ticks.parquet").exists()
 
 
-def test_a_disk_that_is_full_from_the_start_is_one_line(tmp_path, monkeypatch, capsys):
+def test_disk_that_is_full_from_the_start_is_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(provenance, "write_text", refuses)
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
     assert (code, out) == (1, "")
@@ -183,14 +183,14 @@ def few_files():
     resource.setrlimit(resource.RLIMIT_NOFILE, before)
 
 
-def test_a_run_raises_its_limit_of_open_files_as_far_as_it_needs(few_files):
+def test_limit_of_open_files_is_raised_as_far_as_a_run_needs(few_files):
     need_open_files(100)
     assert resource.getrlimit(resource.RLIMIT_NOFILE) == (WORLD_FILES + 100, few_files)
     need_open_files(200)
     assert resource.getrlimit(resource.RLIMIT_NOFILE) == (WORLD_FILES + 200, few_files)
 
 
-def test_where_files_are_too_few_for_all_runners_nothing_begins(tmp_path):
+def test_open_files_too_few_for_all_runners_stop_a_run_before_it_begins(tmp_path):
     few = "import resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)); "
     call = "from swarmwire.deploy.cli.app import main; sys.argv[0] = 'swarmwire'; main()"
     command = [sys.executable, "-c", few + call, "run", LOSSY, "--runners", "per-robot", "--out", tmp_path / "run"]
@@ -202,7 +202,7 @@ def test_where_files_are_too_few_for_all_runners_nothing_begins(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
-def test_where_threads_are_too_few_nothing_begins(tmp_path, monkeypatch, capsys):
+def test_threads_too_few_for_all_runners_stop_a_run_before_it_begins(tmp_path, monkeypatch, capsys):
     started, start = [], start_new_thread
 
     def limited(*arguments):
@@ -219,7 +219,7 @@ def test_where_threads_are_too_few_nothing_begins(tmp_path, monkeypatch, capsys)
     assert not (tmp_path / "run").exists()
 
 
-def test_a_machine_has_room_for_the_threads_of_a_few_runners():
+def test_threads_of_a_few_runners_and_no_billion_files_fit_a_machine():
     need_threads(10)
     with pytest.raises(BadInput, match="open files .*1000000000 runners"):
         need_open_files(1_000_000_000)
@@ -241,7 +241,7 @@ def test_threads_share_two_heaps() -> None:
 
 
 @pytest.mark.skipif(not hasattr(ctypes.CDLL(None), "malloc_trim"), reason="only glibc keeps memory so, and returns it")
-def test_a_run_returns_what_it_keeps_once_a_minute() -> None:
+def test_memory_kept_by_the_heap_is_returned_once_a_minute() -> None:
     done = subprocess.run([sys.executable, "-c", KEEPING], capture_output=True, text=True, check=True, timeout=60)
     at_first, after_a_minute = map(int, done.stdout.split())
     assert at_first < 1e6 * KEPT_MB / 10

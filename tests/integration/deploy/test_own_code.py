@@ -39,7 +39,7 @@ def test_paragraphs_of_help_are_as_wide_as_the_terminal(monkeypatch, capsys):
     assert "  swarmwire robots deploy fleet.toml --group red --restart" in out
 
 
-def test_it_says_its_version(monkeypatch, capsys):
+def test_version_option_prints_the_version(monkeypatch, capsys):
     code, out, errors = called(monkeypatch, capsys, "--version")
     assert (code, out, errors) == (0, f"swarmwire {version('swarmwire-deploy')}\n", "")
 
@@ -60,7 +60,7 @@ def own_tests(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]
     return python("pytest", "-q", "-p", "no:cacheprovider", *arguments, cwd=folder)
 
 
-def test_the_command_makes_the_folder_and_says_what_to_do_next(tmp_path, monkeypatch, capsys):
+def test_new_command_makes_the_folder_and_says_what_to_do_next(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     code, out, errors = called(monkeypatch, capsys, "new", "my_swarm")
     assert (code, errors) == (0, "")
@@ -69,14 +69,14 @@ def test_the_command_makes_the_folder_and_says_what_to_do_next(tmp_path, monkeyp
     assert "swarmwire run my_swarm\n" in out
 
 
-def test_its_files_know_its_name_and_nothing_is_left_to_fill_in(made):
+def test_new_project_has_its_name_and_no_placeholders(made):
     for path in made.iterdir():
         assert "$" not in path.read_text()
     assert 'name = "my_swarm"' in (made / "scenario.toml").read_text()
     assert "`test_my_swarm.py`" in (made / "README.md").read_text()
 
 
-def test_it_checks_and_runs_as_it_is_made(made, tmp_path, monkeypatch, capsys):
+def test_new_project_checks_and_runs_as_it_is(made, tmp_path, monkeypatch, capsys):
     scenario = made / "scenario.toml"
     checked = called(monkeypatch, capsys, "check", scenario)[1]
     assert ": 10 x epuck" in checked
@@ -87,13 +87,13 @@ def test_it_checks_and_runs_as_it_is_made(made, tmp_path, monkeypatch, capsys):
     assert (tmp_path / "out" / "summary.json").is_file()
 
 
-def test_its_own_test_passes_as_it_is_made(made):
+def test_new_projects_own_test_passes_as_it_is(made):
     ended = own_tests(made)
     assert ended.returncode == 0, ended.stdout
     assert "3 passed" in ended.stdout
 
 
-def test_its_own_test_fails_if_the_agent_neither_drives_nor_sends(tmp_path, monkeypatch):
+def test_new_projects_own_test_fails_if_the_agent_neither_drives_nor_sends(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = new_swarm("idle")[0].parent
     agent = folder / "agent.py"
@@ -105,20 +105,20 @@ def test_its_own_test_fails_if_the_agent_neither_drives_nor_sends(tmp_path, monk
     assert "2 failed" in ended.stdout
 
 
-def test_it_follows_ruffs_default_rules(made):
+def test_new_project_follows_ruffs_default_rules(made):
     ended = python("ruff", "check", "--isolated", "--no-cache", ".", cwd=made)
     assert ended.returncode == 0, ended.stdout
 
 
 @pytest.mark.parametrize("name", ["", "My", "2fast", "my-swarm", "a/b", "..", "a b", "a" * 41])
-def test_a_bad_name_is_refused_and_nothing_made(tmp_path, monkeypatch, name):
+def test_new_project_with_a_bad_name_is_refused_and_nothing_made(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(BadInput, match="small letters"):
         new_swarm(name)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_that_is_there_is_left_alone(tmp_path, monkeypatch, capsys):
+def test_new_project_leaves_an_existing_folder_alone(tmp_path, monkeypatch, capsys):
     (tmp_path / "mine").mkdir()
     monkeypatch.chdir(tmp_path)
     code, out, errors = called(monkeypatch, capsys, "new", "mine")
@@ -135,7 +135,7 @@ def scenario(tmp_path):
 
 
 @pytest.mark.parametrize("runners", [None, 2])
-def test_it_is_in_summary_and_table_and_in_a_repetition_from_the_run_folder_alone(tmp_path, scenario, runners):
+def test_custom_metric_is_in_summary_table_and_repetition(tmp_path, scenario, runners):
     result = run_spread(scenario, runners, out=tmp_path / "run")
     folder = RunFolder(tmp_path / "run")
     ticks = folder.metrics()
@@ -149,7 +149,7 @@ def test_it_is_in_summary_and_table_and_in_a_repetition_from_the_run_folder_alon
     assert RunFolder(tmp_path / "again").metrics()["spread"].equals(ticks["spread"])
 
 
-def test_its_parameters_are_kept_with_the_run(tmp_path, scenario):
+def test_custom_metric_parameters_are_kept_with_the_run(tmp_path, scenario):
     (tmp_path / "spread.py").write_text(CODE)
     listed = 'metrics=["order", { metric = "spread.py:East", from_m = 1.0 }]'
     result = run(scenario, overrides=[listed, "metrics.1.from_m=2.0"], out=tmp_path / "run")
@@ -161,7 +161,7 @@ def test_its_parameters_are_kept_with_the_run(tmp_path, scenario):
     assert two_metres_on.metrics["east"].final == pytest.approx((east.metrics["east"].final or 0.0) + 2.0)
 
 
-def test_a_package_brings_one_by_name_and_its_code_is_told_with_the_run(tmp_path, scenario, monkeypatch):
+def test_custom_metric_of_a_package_is_found_by_name_and_its_code_recorded(tmp_path, scenario, monkeypatch):
     install(tmp_path / "site", "wind_metrics", {"east": "East"})
     monkeypatch.syspath_prepend(tmp_path / "site")
     result = run(scenario, overrides=['metrics=["east"]'], out=tmp_path / "run")
@@ -184,10 +184,10 @@ def test_without_the_standard_ones_a_run_has_those_that_are_listed(tmp_path, sce
     assert result.trajectory_sha256 == run(scenario).trajectory_sha256
 
 
-def test_it_changes_nothing_of_the_run(scenario):
+def test_custom_metric_changes_nothing_of_the_run(scenario):
     assert run(scenario).trajectory_sha256 == run(scenario, overrides=["metrics=[]"]).trajectory_sha256
 
 
-def test_one_that_is_not_there_is_refused_before_the_run(scenario):
+def test_custom_metric_that_does_not_exist_is_refused_before_the_run(scenario):
     with pytest.raises(BadInput, match=r"s.toml: metrics\.0: .*'None'"):
         Simulation(scenario, overrides=['metrics=["spread.py:None"]'])

@@ -28,7 +28,7 @@ TICKS = """(count) => new Promise((done) => {
 
 
 @pytest.mark.parametrize("command", [["/none/such"], [sys.executable, "-c", "import sys; sys.exit('no page today')"]])
-def test_a_run_whose_page_cannot_be_had_goes_on_by_itself(tmp_path, command, monkeypatch, capsys):
+def test_run_whose_page_cannot_be_opened_goes_on_by_itself(tmp_path, command, monkeypatch, capsys):
     out = io.StringIO()
     simulation = Simulation(LOSSY, overrides=["duration_s=0.5"], out=tmp_path / "run")
     with PageBeside(simulation, tmp_path / "run", Console(file=out, width=40)) as page:
@@ -40,7 +40,7 @@ def test_a_run_whose_page_cannot_be_had_goes_on_by_itself(tmp_path, command, mon
 
 
 @pytest.mark.parametrize(("paused", "held"), [(True, "paused: swarmwire ctl resume"), (False, "running")])
-def test_a_page_that_is_killed_ends_no_run_and_what_can_be_done_is_said(tmp_path, monkeypatch, paused, held):
+def test_page_that_is_killed_ends_no_run_and_prints_what_can_be_done(tmp_path, monkeypatch, paused, held):
     out = io.StringIO()
     simulation = Simulation(LOSSY, overrides=["duration_s=1"], out=tmp_path / "run")
     page = PageBeside(simulation, tmp_path / "run", Console(file=out))
@@ -62,7 +62,7 @@ def test_a_page_that_is_killed_ends_no_run_and_what_can_be_done_is_said(tmp_path
     assert simulation.result.ended == "duration"
 
 
-def test_a_run_begins_paused_at_the_speed_of_the_wall_clock(tmp_path, monkeypatch):
+def test_run_with_a_page_begins_paused_at_the_speed_of_the_wall_clock(tmp_path, monkeypatch):
     simulation = Simulation(LOSSY, overrides=["duration_s=0.5"], out=tmp_path / "run")
     page = PageBeside(simulation, tmp_path / "run", Console(quiet=True))
     monkeypatch.setattr(page, "_command", [sys.executable, "-c", "import sys; sys.stdin.read()"])
@@ -84,7 +84,7 @@ def test_without_the_extra_it_is_named_and_no_folder_is_made(tmp_path, monkeypat
     assert not (tmp_path / "run").exists()
 
 
-def test_a_page_of_no_run_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+def test_page_without_a_run_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     monkeypatch.setenv("RUST_LOG", "off")
     for arguments in ([], ["3f2a"], [str(tmp_path)]):
@@ -198,7 +198,7 @@ def test_robots_die_and_act_again_and_halves_part_and_heal(run):
         assert "disk radio" in page.inner_text("#jam-why")
 
 
-def test_the_run_stops_when_it_is_asked_to_twice_and_the_page_stays_until_it_is_closed(run):
+def test_page_stops_the_run_at_the_second_click_and_stays_until_closed(run):
     process, address = run
     with chromium(address) as page:
         at_tick(page, 1)
@@ -254,7 +254,7 @@ def test_tab_key_leads_into_the_viewer_and_out_of_it_both_ways(run):
         assert out != "viewer"
 
 
-def test_the_whole_of_it_listens_on_loopback_and_without_the_token_nothing_is_told(run):
+def test_page_listens_on_loopback_and_answers_only_with_the_token(run):
     process, address = run
     sockets = [c for one in family(process.pid) for c in one.net_connections("inet") if c.status == psutil.CONN_LISTEN]
     assert len(sockets) == 2  # the page and its viewer
@@ -272,7 +272,7 @@ def test_browser_requests_of_the_page_and_its_viewer_stay_on_this_machine(run):
     assert requested_hosts(address) == {"127.0.0.1"}
 
 
-def test_nothing_reaches_beyond_a_narrow_window(run):
+def test_page_fits_a_narrow_window(run):
     _, address = run
     with chromium(address) as page:
         at_tick(page, 1)

@@ -59,7 +59,7 @@ def policies_of(**options: float | None) -> Policies:
 
 
 @needs_priority
-def test_the_loop_goes_before_other_processes_in_real_time_and_nothing_inherits_that():
+def test_loop_goes_before_other_processes_in_real_time_and_children_do_not():
     before = os.sched_getscheduler(0), resource.getrlimit(resource.RLIMIT_RTTIME), signal.getsignal(signal.SIGXCPU)
     policies = policies_of(realtime=1.0)
     assert set(policies.of_loop) == {RAISED}
@@ -68,12 +68,12 @@ def test_the_loop_goes_before_other_processes_in_real_time_and_nothing_inherits_
     assert after == before
 
 
-def test_the_loop_has_no_priority_in_lockstep():
+def test_loop_has_no_priority_in_lockstep():
     assert set(policies_of().of_loop) == {os.sched_getscheduler(0)}
 
 
 @needs_priority
-def test_a_loop_that_does_not_sleep_gives_way(capsys: pytest.CaptureFixture[str]):
+def test_loop_that_does_not_sleep_gives_up_its_priority(capsys: pytest.CaptureFixture[str]):
     run(
         LOSSY,
         overrides=["duration_s=0.2"],
@@ -89,7 +89,9 @@ def test_a_loop_that_does_not_sleep_gives_way(capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize(
     ("user", "permit"), [(0, "the capability SYS_NICE"), (1000, "sudo prlimit --rtprio=1 --pid $$")]
 )
-def test_what_would_permit_the_priority_is_said(monkeypatch: pytest.MonkeyPatch, user: int, permit: str):
+def test_priority_that_is_not_permitted_prints_what_would_permit_it(
+    monkeypatch: pytest.MonkeyPatch, user: int, permit: str
+):
     def refuse(*_: object) -> None:
         raise PermissionError
 
@@ -103,7 +105,7 @@ def test_what_would_permit_the_priority_is_said(monkeypatch: pytest.MonkeyPatch,
     assert said == [f"real time: other processes may delay the loop; to let it go before them: {permit}"]
 
 
-def test_a_process_that_is_nice_stays_so(tmp_path: Path):
+def test_process_that_is_nice_gets_no_priority(tmp_path: Path):
     program = f"from swarmwire.deploy.runs.real_time import raised_priority\nwith raised_priority(print):\n    {SHOW}\n"
     nice = ["nice", "-n", "1", sys.executable, "-c", program]
     done = subprocess.run(nice, capture_output=True, text=True, check=True, cwd=tmp_path)

@@ -70,7 +70,7 @@ def test_nobody_looks_on_and_nothing_is_encoded(tmp_path, monkeypatch, every_tic
     assert list(tmp_path.iterdir()) == []
 
 
-def test_who_looks_on_gets_scene_ticks_and_metrics(tmp_path, every_tick):
+def test_observer_gets_scene_ticks_and_metrics(tmp_path, every_tick):
     of = static(4, lights=[[]])
     metrics, observer = publish(tmp_path, of)
     try:
@@ -147,7 +147,7 @@ def test_ticks_that_find_the_sender_busy_are_left_out_and_counted(tmp_path, monk
         observer.end(None)
 
 
-def test_an_error_of_the_sender_ends_the_publishing_not_the_run(tmp_path, monkeypatch, every_tick):
+def test_error_of_the_sender_ends_the_publishing_not_the_run(tmp_path, monkeypatch, every_tick):
     monkeypatch.setattr(published, "encode_truth", lambda _: 1 / 0)
     metrics, observer = publish(tmp_path, of := static(2))
     try:
@@ -170,7 +170,7 @@ def alone():
 
 
 @pytest.mark.parametrize(("number", "stays"), [(signal.SIGSTOP, True), (signal.SIGKILL, False)])
-def test_a_run_is_the_same_beside_an_observer_that_is_frozen_or_killed(
+def test_run_is_the_same_beside_an_observer_that_is_frozen_or_killed(
     tmp_path, monkeypatch, every_tick, alone, number, stays
 ):
     puts, clock = [], WallClock()
@@ -225,7 +225,7 @@ def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path, mon
     assert keys == {"runners": {"frame", "answer"}, "observers": {"truth"}}
 
 
-def test_a_published_run_listens_on_no_network(tmp_path):
+def test_published_run_listens_on_no_network(tmp_path):
     def listening():
         return [c for c in psutil.Process().net_connections("inet") if c.status == psutil.CONN_LISTEN]
 
@@ -238,7 +238,7 @@ def test_a_published_run_listens_on_no_network(tmp_path):
         observer.end(None)
 
 
-def test_what_is_said_of_a_run_that_was_killed_is_not_believed(tmp_path):
+def test_live_file_of_a_killed_run_is_not_believed(tmp_path):
     Live("unixsock-stream//nowhere", "r", 2**22 + 1).write(tmp_path)  # more than Linux gives out
     assert read_live(tmp_path) is None
     Live(f"unixsock-stream/{tmp_path}/none", "r", os.getpid()).write(tmp_path)
@@ -246,7 +246,7 @@ def test_what_is_said_of_a_run_that_was_killed_is_not_believed(tmp_path):
         pass
 
 
-def test_a_run_that_is_paused_has_told_its_newest_tick_and_tells_it_to_who_begins_to_look_on(tmp_path):
+def test_paused_run_shows_its_newest_tick_to_each_new_observer(tmp_path):
     metrics, found = Metrics(), []
     shown = Published(tmp_path, "r", metrics, WallClock())
 

@@ -55,7 +55,7 @@ def test_values_of_the_radio_may_be_set():
     assert contention("ideal", "--contention", "3,20,0.1", "--set", "radio.loss=1.0")["pdr"] == 0.0
 
 
-def test_a_disk_covers_its_circle_from_the_place_or_the_robot():
+def test_disk_radio_covers_its_circle_from_the_given_position_or_robot():
     found = coverage(LOSSY, "--at", "-1,0", "--seed", "4")
     assert (found["seed"], found["range_m"], found["sensitivity_dbm"], found["map"]["mean_dbm"]) == (4, 2.0, None, None)
     assert found["map"]["at_m"] == [-1.0, 0.0]
@@ -77,7 +77,7 @@ def test_signals_have_a_strength_that_walls_and_distance_take():
     assert strength[0] > strength[-1]
 
 
-def test_a_robot_that_sends_does_so_with_the_power_of_its_group():
+def test_coverage_of_a_robot_has_the_power_of_its_group():
     jammed = ROOT / "scenarios" / "jammed.toml"
     base, strong = (
         coverage(jammed, "--from", "lead-0", "--set", f"robots.lead.radio.power_dbm={dbm}") for dbm in (-25.0, -5.0)
@@ -107,13 +107,13 @@ def test_a_robot_that_sends_does_so_with_the_power_of_its_group():
         ((REPLAYED,), str(REPLAYED), "radio.trace.others"),
     ],
 )
-def test_what_makes_no_probe_is_refused(arguments, where, key):
+def test_probe_arguments_that_are_invalid_are_refused(arguments, where, key):
     with pytest.raises(BadInput) as error:
         said(*arguments)
     assert (error.value.where, error.value.key) == (where, key)
 
 
-def test_a_log_becomes_a_table_a_picture_and_what_stands_in_a_scenario(here, monkeypatch, capsys):
+def test_fit_of_a_log_gives_a_table_a_picture_and_a_radio_for_a_scenario(here, monkeypatch, capsys):
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
     (here / "log.csv").write_text(csv_of(made(1, Shadowing(4.0, 5.0), Bursts(0.5, 5.0), packets=60)))
     to = ["--to", "fit.png", "--to", "radio.toml", "--power-dbm", "4"]
@@ -129,7 +129,7 @@ def test_a_log_becomes_a_table_a_picture_and_what_stands_in_a_scenario(here, mon
 
 
 @pytest.mark.parametrize("farthest_m", [2.0, 9.0, 15.5, 400.0, 1e6])
-def test_the_picture_has_distances_to_read_off(here, monkeypatch, capsys, farthest_m):
+def test_fit_picture_has_labelled_distances(here, monkeypatch, capsys, farthest_m):
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
     from swarmwire.metrics.pictures.drawing import canvas, radio_fit
 
@@ -184,7 +184,7 @@ LOGS = {
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_whatever_is_written_a_scenario_takes(here, monkeypatch, capsys, name):
+def test_fitted_radio_is_accepted_in_a_scenario(here, monkeypatch, capsys, name):
     (here / "log.csv").write_text(LOGS[name])
     code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "radio.toml")
     assert (code, errors) == (0, "")
@@ -212,9 +212,7 @@ def test_whatever_is_written_a_scenario_takes(here, monkeypatch, capsys, name):
         (rows(50, lambda _: -60, lambda i: 1 + i), ("path loss: RSSI", "losses: needs 100 ")),
     ],
 )
-def test_a_log_that_tells_nothing_is_refused_with_the_reasons_and_nothing_is_written(
-    here, monkeypatch, capsys, text, reasons
-):
+def test_log_that_allows_no_fit_is_refused_with_the_reasons(here, monkeypatch, capsys, text, reasons):
     (here / "log.csv").write_text(text)
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "radio.toml")
     assert (code, out) == (2, "")
@@ -224,7 +222,7 @@ def test_a_log_that_tells_nothing_is_refused_with_the_reasons_and_nothing_is_wri
     assert not (here / "radio.toml").exists()
 
 
-def test_a_fit_beyond_what_a_scenario_takes_is_refused_with_the_key(here, monkeypatch, capsys):
+def test_fit_beyond_what_a_scenario_takes_is_refused_with_the_key(here, monkeypatch, capsys):
     slow = (f"{i * 1e6},a,b,{i},{-60 if i % 50 > 9 else ''},2\n" for i in range(2000))
     (here / "log.csv").write_text(HEAD + "".join(slow))
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv")
@@ -233,7 +231,7 @@ def test_a_fit_beyond_what_a_scenario_takes_is_refused_with_the_key(here, monkey
     assert "no scenario takes" in errors
 
 
-def test_one_packet_is_no_packets(here, monkeypatch, capsys):
+def test_fit_of_a_single_link_counts_in_the_singular(here, monkeypatch, capsys):
     (here / "log.csv").write_text(SMALL)
     assert "20 packets on 1 link, 20 received" in called(monkeypatch, capsys, "radio", "fit", "log.csv")[1]
 
@@ -251,7 +249,7 @@ def test_one_packet_is_no_packets(here, monkeypatch, capsys):
         (["log.csv", "--within", "0.5"], "--within"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(here, monkeypatch, capsys, arguments, where):
+def test_fit_options_that_are_invalid_are_refused_in_one_line(here, monkeypatch, capsys, arguments, where):
     (here / "log.csv").write_text(SMALL)
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", *arguments)
     assert (code, out, errors.count("\n")) == (2, "", 1)

@@ -81,7 +81,7 @@ def frames_of(folder: Path) -> list[dict[str, Any]]:
     return found
 
 
-def test_a_run_in_real_time_ends_and_its_fates_add_up():
+def test_real_time_run_ends_and_its_fates_add_up():
     result = run(LOSSY, overrides=["duration_s=4"], runners=4, realtime=5)
     assert (result.mode, result.ended, result.ticks) == ("realtime", "duration", 40)
     assert result.wall_time_s >= 4 / 5
@@ -133,7 +133,7 @@ def contradicting(folder: Path) -> None:
     (folder / INPUTS).write_bytes(b"".join(len(frame).to_bytes(LENGTH_BYTES, "little") + frame for frame in packed))
 
 
-def test_the_command_takes_a_subtick_and_tells_how_late_packets_were(tmp_path, monkeypatch, capsys):
+def test_subtick_option_is_accepted_and_lateness_of_packets_printed(tmp_path, monkeypatch, capsys):
     arguments = ("--realtime", "1", "--subtick", "0.005", "--set", "duration_s=0.3", "--out", tmp_path / "run")
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *arguments)
     assert code == 0, errors
@@ -141,7 +141,7 @@ def test_the_command_takes_a_subtick_and_tells_how_late_packets_were(tmp_path, m
     assert "ticks began late" in out
 
 
-def test_in_a_rehearsal_robots_move_packets_are_received_and_metrics_are_measured(monkeypatch) -> None:
+def test_rehearsal_moves_robots_receives_packets_and_measures_metrics(monkeypatch) -> None:
     scenario = load_scenario(FLOCKING)
     world = World(scenario, [1], {"flock": ("radio.range",)})
     fates, see = np.zeros(len(Fate), np.int64), Metrics.see
@@ -158,7 +158,7 @@ def test_in_a_rehearsal_robots_move_packets_are_received_and_metrics_are_measure
 
 
 @pytest.mark.parametrize("subticks", [False, True])
-def test_a_rehearsal_receives_packets_within_ticks_if_the_run_has_sub_ticks(subticks, monkeypatch) -> None:
+def test_rehearsal_receives_packets_within_ticks_if_the_run_has_subticks(subticks, monkeypatch) -> None:
     scenario = load_scenario(FLOCKING)
     world = World(scenario, [1], {"flock": ("radio.range",)})
     medium, tick_ns = new_medium(scenario, world, None), NS_PER_S // world.static.rate_hz
@@ -176,7 +176,7 @@ def test_a_rehearsal_receives_packets_within_ticks_if_the_run_has_sub_ticks(subt
     assert (sum(within) > 0) == subticks
 
 
-def test_a_run_with_gateways_is_rehearsed_before_one_of_them_answers(monkeypatch) -> None:
+def test_rehearsal_of_a_gateway_run_comes_before_any_gateway_answers(monkeypatch) -> None:
     said = list[str]()
     monkeypatch.setattr(
         simulation_module, "warm_up", lambda world, *_, **__: said.append(f"rehearsed {world.static.robots}")
@@ -189,7 +189,7 @@ def test_a_run_with_gateways_is_rehearsed_before_one_of_them_answers(monkeypatch
     assert said == ["rehearsed 8", "served"]
 
 
-def test_every_run_in_real_time_is_rehearsed_and_goes_as_it_would_without(monkeypatch) -> None:
+def test_rehearsal_comes_before_every_real_time_run_and_changes_nothing(monkeypatch) -> None:
     rehearsed = list[int]()
     monkeypatch.setattr(simulation_module, "warm_up", lambda *given, **by: (rehearsed.append(1), warm_up(*given, **by)))
     results = list[list[str]]()

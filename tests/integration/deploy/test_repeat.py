@@ -90,7 +90,7 @@ def copied(folder: Path) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("encoded", [False, True])
-def test_a_run_is_the_same_again_also_through_frames(tmp_path, monkeypatch, encoded):
+def test_repeat_gives_the_same_run_also_through_frames(tmp_path, monkeypatch, encoded):
     disrupted = ROOT / "scenarios" / "flocking-disrupted.toml"
     run(disrupted, overrides=["duration_s=2", "radio.loss=0.4"], seed=7, out=tmp_path / "run")
     if encoded:
@@ -110,7 +110,7 @@ def test_several_seeds_are_repeated_side_by_side(tmp_path):
     assert [arena.seed for arena in repetition.result.arenas] == [3, 5]
 
 
-def test_the_run_folder_holds_the_scenario_as_run_without_what_was_left_out(tmp_path):
+def test_scenario_in_the_run_folder_is_as_run_without_omitted_keys(tmp_path):
     run(LOSSY, overrides=[*SHORT, "radio.loss=0.45"], seed=9, out=tmp_path / "run")
     text = (tmp_path / "run" / "scenario.toml").read_text()
     assert text.startswith("# As run by swarmwire ")
@@ -122,7 +122,7 @@ def test_the_run_folder_holds_the_scenario_as_run_without_what_was_left_out(tmp_
 
 
 @pytest.mark.parametrize("scenario", sorted((ROOT / "scenarios").glob("*.toml")), ids=lambda path: path.stem)
-def test_every_shipped_scenario_survives_being_made_in_python_and_written(tmp_path, scenario):
+def test_scenario_that_is_shipped_survives_python_and_being_written(tmp_path, scenario):
     as_read = load_scenario(scenario)
     changed = as_read.model_copy(update={"duration_s": 0.1})
     run(changed, out=tmp_path / "run", record=Recording(rrd=False, tables=False))
@@ -157,7 +157,7 @@ def test_agent_files_are_copied_and_the_originals_are_not_needed(tmp_path, mine)
     assert repeat(tmp_path / "again").same
 
 
-def test_an_agent_file_that_was_edited_since_is_named_and_its_run_is_another(tmp_path, mine):
+def test_agent_file_that_was_edited_is_named_and_the_run_differs(tmp_path, mine):
     run(mine, out=tmp_path / "run")
     path = tmp_path / "run" / "files" / "mine.py"
     path.write_text(path.read_text().replace("0.5)", "0.6)"))  # of the same size, maybe within the same second
@@ -170,7 +170,7 @@ def test_an_agent_file_that_was_edited_since_is_named_and_its_run_is_another(tmp
         repeat(tmp_path / "run")
 
 
-def test_a_changed_installed_module_is_named(tmp_path, mine, monkeypatch):
+def test_installed_module_that_changed_is_named(tmp_path, mine, monkeypatch):
     package = tmp_path / "site" / "circling_agents"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("from circling_agents.circler import Circler as Circler\n")
@@ -197,7 +197,7 @@ def test_parts_of_swarmwire_are_named_once_and_a_lone_module_is_its_file(tmp_pat
     assert module_digests(["lone_circler:Circler"])["lone_circler"] != digests["lone_circler"]
 
 
-def test_what_the_run_ran_on_is_compared(tmp_path):
+def test_versions_modules_and_cpu_of_a_run_are_compared(tmp_path):
     run(LOSSY, overrides=SHORT, out=tmp_path / "run")
     path = tmp_path / "run" / "run.json"
     origin = json.loads(path.read_text())
@@ -215,7 +215,7 @@ def called(*arguments: str | Path) -> Result:
     return CliRunner().invoke(app, ["repeat", *map(str, arguments)])
 
 
-def test_the_command_says_same_or_different_and_names_what_changed(tmp_path, mine):
+def test_repeat_command_prints_same_or_different_and_names_changes(tmp_path, mine):
     folder = tmp_path / "run"
     run(mine, out=folder)
     same = called(folder, "--out", tmp_path / "again")
@@ -231,7 +231,7 @@ def test_the_command_says_same_or_different_and_names_what_changed(tmp_path, min
     assert "files/mine.py" in other.stdout
 
 
-def test_an_agent_that_draws_by_itself_is_suspected(tmp_path, mine):
+def test_agent_with_random_numbers_of_its_own_is_suspected(tmp_path, mine):
     path = mine.parent / "mine.py"
     path.write_text("import random\n" + FILE_AGENT.replace("0.5)", "random.random())"))
     run(mine, out=tmp_path / "run")
@@ -250,7 +250,7 @@ def test_an_agent_that_draws_by_itself_is_suspected(tmp_path, mine):
         (lambda run: (run / "scenario.toml").unlink(), "scenario.toml"),
     ],
 )
-def test_what_is_no_run_folder_is_refused_in_one_line(tmp_path, mine, spoil, expected):
+def test_folder_without_a_run_is_refused_in_one_line(tmp_path, mine, spoil, expected):
     run(mine, out=tmp_path / "run")
     spoil(tmp_path / "run")
     with pytest.raises(BadInput, match=expected) as caught:
@@ -259,7 +259,7 @@ def test_what_is_no_run_folder_is_refused_in_one_line(tmp_path, mine, spoil, exp
 
 
 @pytest.mark.parametrize(("logged", "kept", "ticks"), [(True, False, 7), (True, True, 20), (False, False, 20)])
-def test_a_run_that_was_killed_is_compared_as_far_as_it_came(tmp_path, mine, logged, kept, ticks):
+def test_killed_run_is_compared_as_far_as_it_came(tmp_path, mine, logged, kept, ticks):
     """As SIGKILL leaves it: the folder of a run that was stepped, before it could write its summary."""
     with Simulation(mine, out=tmp_path / "run") as simulation:
         simulation.run(7)
@@ -276,7 +276,7 @@ def test_a_run_that_was_killed_is_compared_as_far_as_it_came(tmp_path, mine, log
     assert "summary.json" in repetition.why_not_all
 
 
-def test_a_run_that_an_agent_ended_is_repeated_up_to_there(tmp_path, mine):
+def test_run_that_an_agent_ended_is_repeated_to_its_end(tmp_path, mine):
     path = mine.parent / "mine.py"
     failing = "        if robots.time_s > 0.45:\n            raise ValueError('enough')\n        robots.drive"
     path.write_text(FILE_AGENT.replace("        robots.drive", failing))
@@ -288,7 +288,7 @@ def test_a_run_that_an_agent_ended_is_repeated_up_to_there(tmp_path, mine):
     assert re.search("same run.* 5 ticks.* failed", called(tmp_path / "run").stdout)
 
 
-def test_the_first_tick_that_came_out_differently_is_named(tmp_path, mine):
+def test_first_tick_that_differs_is_named(tmp_path, mine):
     run(mine, out=tmp_path / "run")
     path = tmp_path / "run" / "files" / "mine.py"
     path.write_text(FILE_AGENT.replace("0.5)", "0.5 if robots.time_s < 0.95 else 0.6)"))
@@ -296,7 +296,7 @@ def test_the_first_tick_that_came_out_differently_is_named(tmp_path, mine):
     assert (repetition.same, repetition.first_difference) == (False, 10)
 
 
-def test_an_interrupted_run_is_repeated_as_far_as_it_came(tmp_path):
+def test_interrupted_run_is_repeated_as_far_as_it_came(tmp_path):
     watcher = Watcher((lambda truth: truth.tick == 12, interrupt))
     result = run(LOSSY, overrides=["duration_s=500"], out=tmp_path / "run", observers=[watcher])
     assert (result.ended, result.ticks) == ("interrupted", 13)
@@ -319,7 +319,7 @@ class Standing:
     def close(self) -> None: ...
 
 
-def test_a_record_that_cannot_be_written_does_not_end_the_run_and_is_counted(tmp_path):
+def test_record_that_cannot_be_written_does_not_end_the_run_and_is_counted(tmp_path):
     (tmp_path / "inputs").write_text("in the way")
     backend = RecordedBackend(Standing(), tmp_path, lambda tick: tick >= 2)
     for tick in range(5):
@@ -357,7 +357,7 @@ def thaw() -> None:
     runners_here()[0].resume()
 
 
-def test_a_run_in_real_time_whose_runner_was_frozen_for_a_while_is_the_same_again(tmp_path, talkers):
+def test_real_time_run_with_a_runner_frozen_for_a_while_is_repeated(tmp_path, talkers):
     """The watchdog stops its robots, which go on when it does."""
     watcher = Watcher(
         (lambda truth: not still(truth), freeze),
@@ -383,7 +383,7 @@ def test_a_run_in_real_time_whose_runner_was_frozen_for_a_while_is_the_same_agai
 
 
 @pytest.mark.parametrize("realtime", [None, 10])
-def test_a_run_that_lost_a_runner_whose_robots_stand_from_then_on_is_the_same_again(tmp_path, talkers, realtime, capfd):
+def test_run_that_lost_a_runner_for_good_is_repeated(tmp_path, talkers, realtime, capfd):
     watcher = Watcher(
         (lambda truth: truth.tick >= 5 and not still(truth), kill_one),
         *[(lambda truth: still(truth) == 5, lambda: None)] * 10,
@@ -404,7 +404,7 @@ def test_a_run_that_lost_a_runner_whose_robots_stand_from_then_on_is_the_same_ag
     assert repetition.result.ticks == result.ticks
 
 
-def test_a_run_whose_lost_runner_was_replaced_by_a_fresh_one_is_the_same_again(tmp_path, talkers, monkeypatch):
+def test_run_whose_lost_runner_was_replaced_is_repeated(tmp_path, talkers, monkeypatch):
     takeovers: list[subprocess.Popen[bytes]] = []
 
     def take_over(_: RunWriter, text: str) -> None:
@@ -439,14 +439,14 @@ def in_real_time(recorded, tmp_path) -> Path:
     return copytree(recorded, tmp_path / "run")
 
 
-def test_the_record_of_a_run_in_real_time_has_each_tick_and_nothing_between(recorded):
+def test_record_of_a_real_time_run_has_each_tick_and_nothing_between(recorded):
     found = frames_of(recorded)
     assert len(found) == 10
     assert not any(WITHIN in frame["arrays"] for frame in found)
     assert repeat(recorded).same
 
 
-def test_a_record_that_is_cut_off_is_repeated_as_far_as_it_is_whole(in_real_time):
+def test_record_that_is_truncated_is_repeated_as_far_as_it_is_whole(in_real_time):
     data = (in_real_time / INPUTS).read_bytes()
     (in_real_time / INPUTS).write_bytes(data[:-10])
     repetition = repeat(in_real_time)
@@ -458,7 +458,7 @@ def test_a_record_that_is_cut_off_is_repeated_as_far_as_it_is_whole(in_real_time
     assert repeat(in_real_time).result.ticks == 9
 
 
-def test_a_record_that_is_missing_or_damaged_is_refused(in_real_time):
+def test_record_that_is_missing_or_damaged_is_refused(in_real_time):
     data = bytearray((in_real_time / INPUTS).read_bytes())
     data[10] ^= 0xFF
     (in_real_time / INPUTS).write_bytes(data)

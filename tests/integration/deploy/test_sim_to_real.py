@@ -30,7 +30,7 @@ def campaign(tmp_path_factory):
     return to
 
 
-def test_a_run_and_its_logs_side_by_side(folders, monkeypatch, capsys):
+def test_sim_to_real_of_a_run_prints_it_beside_its_logs(folders, monkeypatch, capsys):
     code, out, errors = called(monkeypatch, capsys, "sim-to-real", *folders)
     assert (code, errors) == (0, "")
     head = next(line for line in out.splitlines() if line.startswith("metric"))
@@ -61,7 +61,7 @@ def test_another_agent_is_named(folders, tmp_path, monkeypatch, capsys):
     assert re.search("swarmwire.agent.behaviours:Flocking .*walk.py:Walk ", out)
 
 
-def test_a_campaign_has_a_spread(campaign, folders, monkeypatch, capsys):
+def test_sim_to_real_of_a_campaign_prints_a_spread(campaign, folders, monkeypatch, capsys):
     code, out, errors = called(monkeypatch, capsys, "sim-to-real", f"{campaign}@radio.loss=0.3", folders[1])
     assert (code, errors) == (0, "")
     assert "over 3 runs" in out.splitlines()[-1]
@@ -71,7 +71,7 @@ def test_a_campaign_has_a_spread(campaign, folders, monkeypatch, capsys):
     assert " to " in pdr
 
 
-def test_a_shorter_log_is_not_held_against_a_longer_runs_totals(folders, campaign, tmp_path, monkeypatch, capsys):
+def test_shorter_log_is_not_compared_with_a_longer_runs_totals(folders, campaign, tmp_path, monkeypatch, capsys):
     logs = as_logs(watched("duration_s=8"), tmp_path / "logs")
     out = called(monkeypatch, capsys, "sim-to-real", f"{campaign}@radio.loss=0.3", logs)[1]
     assert not [line for line in out.splitlines() if line.startswith(("total pdr ", "packets sent", "latency p50"))]
@@ -98,7 +98,9 @@ def test_numbers_and_a_page_are_written(folders, tmp_path, monkeypatch, capsys):
     assert rows["total pdr"]["what"] == "radio"
 
 
-def test_what_cannot_be_is_refused_in_one_line(folders, campaign, tmp_path, monkeypatch, capsys):
+def test_sim_to_real_arguments_that_are_invalid_are_refused_in_one_line(
+    folders, campaign, tmp_path, monkeypatch, capsys
+):
     run, logs = folders
     (tmp_path / "empty").mkdir()
     for arguments, told in (
@@ -116,7 +118,7 @@ def test_what_cannot_be_is_refused_in_one_line(folders, campaign, tmp_path, monk
         assert errors.count("\n") == 1
 
 
-def test_a_network_becomes_a_radio_that_a_scenario_takes(folders, tmp_path, monkeypatch, capsys):
+def test_fit_of_a_swarms_logs_gives_a_radio_that_a_scenario_takes(folders, tmp_path, monkeypatch, capsys):
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
     to = ["--to", tmp_path / "fit.png", "--to", tmp_path / "radio.toml"]
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", folders[1], *to)
@@ -132,14 +134,14 @@ def test_a_network_becomes_a_radio_that_a_scenario_takes(folders, tmp_path, monk
     assert run(refitted, overrides=["duration_s=0.2"]).ticks > 0  # whose agents need range and bearing
 
 
-def test_a_log_that_is_not_there_is_said_not_to_be(tmp_path, monkeypatch, capsys):
+def test_fit_of_a_missing_log_is_refused(tmp_path, monkeypatch, capsys):
     for name in ("lgos", "received.csv"):
         code, out, errors = called(monkeypatch, capsys, "radio", "fit", tmp_path / name)
         assert (code, out) == (2, "")
         assert errors.startswith(f"error: {tmp_path / name}: expected a log")
 
 
-def test_one_robots_table_is_enough_for_a_fit(folders, monkeypatch, capsys):
+def test_fit_of_a_single_robots_table_is_possible(folders, monkeypatch, capsys):
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", folders[1] / "flock-0" / "received.csv")
     assert (code, errors) == (0, "")
     assert "on 5 links" in out

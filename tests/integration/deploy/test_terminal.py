@@ -80,7 +80,7 @@ def test_ctrl_c_ends_a_run_in_real_time_over_runners_and_gives_the_terminal_back
     assert realtime["factor"] == 20.0
 
 
-def test_a_run_that_fails_gives_the_terminal_back(tmp_path):
+def test_run_that_fails_gives_the_terminal_back(tmp_path):
     (tmp_path / "faulty.py").write_text(FAULTY)
     agent = ["--set", f"robots.flock.agent={tmp_path / 'faulty.py'}:Faulty", "--set", "robots.flock.params={}"]
     with terminal("run", LOSSY, *agent, "--out", tmp_path / "run") as user:
@@ -99,7 +99,7 @@ def test_without_a_terminal_there_are_plain_lines(tmp_path):
         assert re.search(r", order [\d.]+, largest_component [\d.]+, components \d+, link PDR so far [\d.]+$", line)
 
 
-def test_who_wants_quiet_gets_no_panel(tmp_path):
+def test_quiet_option_shows_no_panel(tmp_path):
     with terminal("run", LOSSY, "--set", "duration_s=1", "--quiet", "--out", tmp_path / "run") as user:
         assert user.rest() == ""
         assert user.process.returncode == 0
@@ -140,7 +140,7 @@ def listens_at(process: "subprocess.Popen[str]") -> tuple[str, str]:
     return found[1], process.stdout.readline().strip()
 
 
-def test_two_terminals_make_the_same_run_as_one(tmp_path):
+def test_join_from_two_terminals_makes_the_same_run_as_one(tmp_path):
     folder = tmp_path / "run"
     with world(folder, "--listen", "tcp/127.0.0.1:0", "--observe", "tcp/127.0.0.1:0") as process:
         endpoint, typed = listens_at(process)
@@ -171,7 +171,7 @@ def test_two_terminals_make_the_same_run_as_one(tmp_path):
     assert repeat(folder).same
 
 
-def test_a_run_that_cannot_be_observed_as_wanted_is_refused_before_anybody_joins(tmp_path):
+def test_observe_address_in_use_is_refused_before_anybody_joins(tmp_path):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -234,7 +234,7 @@ def test_with_certificates_a_runner_is_who_its_own_says(tmp_path, certs):
     assert "r1 joined with flock-0 … flock-19 (20 robots) before the first tick" in errors
 
 
-def test_the_certificates_of_somebody_elses_ca_need_the_names_of_members_in_place_of_a_register(tmp_path, certs):
+def test_certificates_of_a_foreign_ca_need_member_names_without_a_register(tmp_path, certs):
     (certs / "certs.json").unlink()
     mine = ("--certs", certs, "--name", "world", "--runner", "r1")
     with world(tmp_path / "run", "--listen", "tls/127.0.0.1:0", *mine) as process:
@@ -245,7 +245,7 @@ def test_the_certificates_of_somebody_elses_ca_need_the_names_of_members_in_plac
         assert (played.returncode, played.stderr.splitlines()[-1]) == (0, "the run is over")
 
 
-def test_in_a_terminal_it_shows_who_is_missing_and_ctrl_c_ends_the_waiting(tmp_path):
+def test_world_at_a_terminal_shows_who_is_missing_until_ctrl_c(tmp_path):
     arguments = ("world", LOSSY, "--listen", "tcp/127.0.0.1:0", "--out", tmp_path / "run")
     with terminal(*arguments) as window:
         while "0 of 20 robots have agents" not in window.text:
@@ -266,12 +266,12 @@ def test_in_a_terminal_it_shows_who_is_missing_and_ctrl_c_ends_the_waiting(tmp_p
         (("tcp/127.0.0.1:1", "--scenario", "no.toml"), "no.toml"),
     ],
 )
-def test_what_cannot_be_joined_is_bad_input(monkeypatch, capsys, arguments, why):
+def test_join_options_that_are_invalid_are_refused(monkeypatch, capsys, arguments, why):
     code, _, errors = called(monkeypatch, capsys, "join", *arguments)
     assert code == 2
     assert why in errors
 
 
-def test_where_nobody_listens_it_says_so():
+def test_join_where_nobody_listens_says_so():
     with pytest.raises(RunnerLost, match="no world answers at tcp/127.0.0.1:1$"):
         join(JoinSettings("tcp/127.0.0.1:1", name="a", connect_s=0.2), Arrivals(), ProcessPool(thread_server()))

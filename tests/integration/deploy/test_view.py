@@ -73,7 +73,7 @@ def listening(pid):
     return [socket.laddr.ip for socket in sockets]
 
 
-def test_a_recording_without_an_end_is_shown_on_loopback_until_ctrl_c(folder, tmp_path):
+def test_recording_without_an_end_is_shown_on_loopback_until_ctrl_c(folder, tmp_path):
     shown = tmp_path / "cut.rrd"
     shown.write_bytes((folder / "run.rrd").read_bytes()[:150_000])
     with viewing(shown) as (process, page):
@@ -167,7 +167,7 @@ def test_view_ends_with_its_window(folder, monkeypatch):
     assert not list(looks)
 
 
-def test_a_recording_without_an_end_is_completed_in_a_copy(folder, tmp_path):
+def test_recording_without_an_end_is_completed_in_a_copy(folder, tmp_path):
     good = folder / "run.rrd"
     with readable(good) as path:
         assert path == good
@@ -191,7 +191,7 @@ def live_run(folder, *observers, duration_s=3):
     return run(LOSSY, overrides=[f"duration_s={duration_s}"], observers=[metrics, shown, *observers])
 
 
-def test_a_live_view_listens_on_loopback_and_the_run_does_not_notice_its_death(tmp_path, capfd):
+def test_live_view_listens_on_loopback_and_its_death_leaves_the_run_alone(tmp_path, capfd):
     view, addresses, told = LiveView(tmp_path, web=True), [], []
 
     def told_where():
@@ -216,7 +216,7 @@ def test_a_live_view_listens_on_loopback_and_the_run_does_not_notice_its_death(t
 
 
 @pytest.mark.parametrize("frozen", [False, True])
-def test_a_live_view_ends_with_the_block_that_opened_it(tmp_path, monkeypatch, frozen):
+def test_live_view_ends_with_the_block_that_opened_it(tmp_path, monkeypatch, frozen):
     if frozen:
         monkeypatch.setattr(live_view, "EXIT_TIMEOUT_S", 0.2)
     view, family = LiveView(tmp_path, web=True), []
@@ -234,7 +234,7 @@ def test_a_live_view_ends_with_the_block_that_opened_it(tmp_path, monkeypatch, f
     assert not [process for process in family if process.is_running() and process.status() != psutil.STATUS_ZOMBIE]
 
 
-def test_a_live_view_that_cannot_be_opened_says_so_and_the_run_goes_on(tmp_path, monkeypatch, capsys):
+def test_live_view_that_cannot_be_opened_says_so_and_the_run_goes_on(tmp_path, monkeypatch, capsys):
     view = LiveView(tmp_path)
     monkeypatch.setattr(view, "_command", [str(tmp_path / "none")])
     with view:
@@ -269,7 +269,7 @@ def parts(drawn, _):
 
 
 @pytest.mark.parametrize("viewer_for", [hub, parts])
-def test_what_a_run_publishes_is_drawn_in_the_viewer(tmp_path, viewer_for):
+def test_published_run_is_drawn_in_the_viewer(tmp_path, viewer_for):
     drawn, clock = tmp_path / "drawn.rrd", WallClock()
     poses, held = {}, contextlib.ExitStack()
 

@@ -82,7 +82,7 @@ def same(folder, reference):
     assert series_in(folder).equals(series_in(reference / "c"), null_equal=True)
 
 
-def test_a_cluster_gives_the_rows_and_series_of_one_machine_and_is_left_as_it_was(tmp_path, reference, one_worker):
+def test_dask_cluster_gives_the_rows_and_series_of_one_machine(tmp_path, reference, one_worker):
     done = sweep(reference / "two.toml", out=tmp_path / "c", executor=one_worker.name, **ASKED)
     assert done.is_over
     same(tmp_path / "c", reference)
@@ -92,7 +92,7 @@ def test_a_cluster_gives_the_rows_and_series_of_one_machine_and_is_left_as_it_wa
     assert not list(local.rglob("two.toml")) + list(local.rglob("stumbling.py"))
 
 
-def test_an_agent_that_kills_its_process_costs_its_run_alone(tmp_path, reference, one_worker):
+def test_agent_that_kills_its_process_costs_its_run_alone(tmp_path, reference, one_worker):
     kill = ['robots.pair.params.how="kill"']
     sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, batch=2, overrides=kill)
     assert [row["error"] for row in rows_in(tmp_path / "c")] == [None, "the worker died"]
@@ -128,7 +128,7 @@ def interrupted_once_at_work(nanny):
     return execute_interrupted
 
 
-def test_a_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference):
+def test_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference):
     with cluster(tmp_path, 1) as there:
         gone = []
 
@@ -148,7 +148,7 @@ def test_a_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference)
 
 
 @pytest.mark.slow  # dask waits fifteen seconds at least
-def test_a_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference):
+def test_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference):
     with cluster(tmp_path, 1, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="15s") as there:  # in place of five minutes
 
         def freeze_it():
@@ -165,7 +165,7 @@ def test_a_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, referenc
     same(tmp_path / "c", reference)
 
 
-def test_a_run_that_stands_still_ends_its_worker_and_is_a_failed_row(tmp_path, reference):
+def test_run_that_stands_still_ends_its_worker_and_is_a_failed_row(tmp_path, reference):
     (tmp_path / "short.py").write_text("from swarmwire.deploy.campaigns import dask\ndask.MAX_SILENCE_S = 3.0\n")
     (reference / "hanging.py").write_text(HANGING)
     with cluster(tmp_path, 0, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0") as there:
@@ -176,7 +176,7 @@ def test_a_run_that_stands_still_ends_its_worker_and_is_a_failed_row(tmp_path, r
     assert rows_in(tmp_path / "c")[0]["error"] == "the worker died"
 
 
-def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
+def test_scheduler_that_is_killed_is_one_line_and_the_sweep_resumes_here(
     tmp_path, reference, monkeypatch, capsys, caplog
 ):
     folder = tmp_path / "c"
@@ -198,7 +198,7 @@ def test_a_scheduler_that_is_killed_is_one_line_and_the_rest_is_done_here(
     same(folder, reference)
 
 
-def test_a_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, one_worker, monkeypatch):
+def test_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, one_worker, monkeypatch):
     monkeypatch.setattr(dask, "POLL_S", 0.1)
     monkeypatch.setattr(dask, "CLOSE_S", 0.5)
     monkeypatch.setattr(dask, "PREPARE_S", 1.0)
@@ -227,7 +227,7 @@ def test_without_workers_or_with_one_of_another_version_nothing_begins(tmp_path,
         assert not (tmp_path / "c").exists()
 
 
-def test_a_worker_of_another_version_that_comes_later_is_left_out(tmp_path, reference):
+def test_worker_of_another_version_that_joins_later_is_left_out(tmp_path, reference):
     (tmp_path / "odd.py").write_text(ODD)
     folder, told, rows = CampaignWriter(reference / "c", read_campaign(reference / "c")), [], []
     tasks = tasks_of(folder.campaign, folder, (), 1, 1)
@@ -251,7 +251,7 @@ def test_a_worker_of_another_version_that_comes_later_is_left_out(tmp_path, refe
     assert len({row["machine_worker"] for row in rows}) == 1
 
 
-def test_a_scheduler_out_of_reach_is_one_line(caplog):
+def test_scheduler_out_of_reach_is_one_line(caplog):
     with socket.socket() as nobody:
         nobody.bind(("127.0.0.1", 0))
         name = f"dask://127.0.0.1:{nobody.getsockname()[1]}"

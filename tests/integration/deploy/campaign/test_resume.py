@@ -83,7 +83,7 @@ def test_whichever_write_was_the_last_nothing_is_lost_or_there_twice(tmp_path, s
     same(folder, whole)
 
 
-def test_only_what_is_missing_is_run(whole, here):
+def test_resume_runs_only_what_is_missing(whole, here):
     (whole / "summary.parquet").unlink()
     assert resume(whole).done == 4
     assert resume(whole).is_over
@@ -134,7 +134,7 @@ def test_other_code_versions_and_machines_are_refused_unless_people_insist(whole
 
 
 @pytest.mark.parametrize("text", [None, "{", "[]", '{"format": 1}', '{"format": 2}'])
-def test_a_folder_that_is_no_campaign_is_refused_in_a_line(tmp_path, text):
+def test_folder_without_a_campaign_is_refused_in_a_line(tmp_path, text):
     if text is not None:
         (tmp_path / "campaign.json").write_text(text)
     with pytest.raises(BadInput, match=f"^{tmp_path}.*expected ") as refused:
@@ -142,12 +142,12 @@ def test_a_folder_that_is_no_campaign_is_refused_in_a_line(tmp_path, text):
     assert "\n" not in str(refused.value)
 
 
-def test_a_folder_is_for_one_process_at_a_time(whole):
+def test_campaign_folder_is_for_one_process_at_a_time(whole):
     with store.locked(whole, "campaign"), pytest.raises(BadInput, match="another process is at work"):
         resume(whole)
 
 
-def test_a_disk_that_is_full_at_some_time_loses_nothing_that_is_done(tmp_path, scenario, here, monkeypatch):
+def test_full_disk_loses_no_finished_runs_of_a_sweep(tmp_path, scenario, here, monkeypatch):
     folder, count = tmp_path / "c", 3
     with monkeypatch.context() as patched:
         dying_at(patched, count, FULL)
@@ -162,7 +162,7 @@ def test_a_disk_that_is_full_at_some_time_loses_nothing_that_is_done(tmp_path, s
     assert len(rows_in(folder)) == 4
 
 
-def test_the_command_line_says_so_in_one_line(tmp_path, scenario, here, monkeypatch, capsys):
+def test_full_disk_in_a_sweep_is_one_line_at_the_command_line(tmp_path, scenario, here, monkeypatch, capsys):
     with monkeypatch.context() as patched:
         dying_at(patched, 2, FULL)
         code, _, errors = called(
@@ -265,7 +265,7 @@ def test_wherever_a_file_is_damaged_one_line_names_it_or_nothing_is_wrong(sound,
 
 
 @pytest.mark.parametrize("data", [b"", b"PAR1", b"PAR1" + b"x" * 400 + b"PAR1"])  # none is a whole Parquet file
-def test_a_damaged_part_is_told_by_its_name_and_without_it_its_runs_are_run_again(half, untouched, data):
+def test_damaged_part_is_named_and_its_runs_run_again_without_it(half, untouched, data):
     part = half / "parts" / "part-00000001.parquet"
     part.write_bytes(data)
     for call in (resume, lambda folder: CampaignRun(folder, 1).run()):
@@ -276,7 +276,7 @@ def test_a_damaged_part_is_told_by_its_name_and_without_it_its_runs_are_run_agai
     assert series_in(half).equals(series_in(untouched), null_equal=True)
 
 
-def test_a_damaged_series_is_told_by_its_name_and_without_it_the_table_is_whole(half, untouched):
+def test_damaged_series_is_named_and_the_table_is_whole_without_it(half, untouched):
     part = next((half / "series").glob("part-*"))
     part.write_bytes(b"")
     assert refused(resume, half).where == str(part)
@@ -293,7 +293,7 @@ def test_series_of_another_type_are_told_by_file_and_column(half):
     assert first.exists()
 
 
-def test_a_table_of_another_campaign_is_told_by_the_first_strange_column(half):
+def test_table_of_another_campaign_is_refused_with_file_and_column(half):
     part = half / "parts" / "part-00000000.parquet"
     rows = pl.read_parquet(part)
     for frame, column, expected in (
@@ -333,14 +333,14 @@ def test_files_of_others_in_the_folder_are_left_alone(half, untouched):
         ("responses", [{"column": "order.final", "unit": "", "kind": "tome", "help": ""}]),
     ],
 )
-def test_what_campaigns_never_say_is_refused_by_its_key(untouched, key, value):
+def test_campaign_json_with_an_invalid_key_is_refused(untouched, key, value):
     about = untouched / "campaign.json"
     about.write_text(json.dumps({**json.loads(about.read_text()), key: value}))
     for error in (refused(resume, untouched), refused(CampaignRun, untouched, 0)):
         assert (error.where, error.key.startswith(key)) == (str(about), True)
 
 
-def test_a_campaign_that_lacks_any_key_is_refused(untouched):
+def test_campaign_json_without_any_one_key_is_refused(untouched):
     about = untouched / "campaign.json"
     found = json.loads(about.read_text())
     for key in found:
@@ -348,14 +348,14 @@ def test_a_campaign_that_lacks_any_key_is_refused(untouched):
         assert refused(read_campaign, untouched).where == str(about)
 
 
-def test_a_campaign_that_ended_before_its_first_run_says_what_to_do(half):
+def test_campaign_that_ended_before_its_first_run_says_to_begin_again(half):
     (half / "campaign.json").unlink()
     error = refused(resume, half)
     assert error.where == str(half)
     assert "begin again" in error.expected
 
 
-def test_a_summary_beside_unreadable_others_is_kept(untouched):
+def test_summary_beside_unreadable_parts_is_kept(untouched):
     before = (untouched / "summary.parquet").read_bytes()
     (untouched / "parts").mkdir()
     (untouched / "parts" / "part-00000000.parquet").write_bytes(b"")
@@ -363,7 +363,7 @@ def test_a_summary_beside_unreadable_others_is_kept(untouched):
     assert (untouched / "summary.parquet").read_bytes() == before
 
 
-def test_a_package_that_is_no_more_has_changed(untouched):
+def test_package_that_is_no_longer_installed_counts_as_changed(untouched):
     about = untouched / "campaign.json"
     found = json.loads(about.read_text())
     about.write_text(json.dumps({**found, "modules": {**found["modules"], "gone_away": "0"}}))

@@ -41,7 +41,7 @@ def reference(tmp_path_factory):
     return folder
 
 
-def test_each_run_has_a_row_that_says_what_a_run_of_its_own_would(reference):
+def test_row_of_a_sweep_has_what_a_run_of_its_own_has(reference):
     rows = rows_in(reference / "c")
     assert [(row["run"], row["point"], row["seed"]) for row in rows] == [
         (i, i // 3, i % 3 + 1) for i in range(12)
@@ -87,7 +87,7 @@ def test_series_hold_each_ticks_metrics(reference):
     np.testing.assert_array_equal(last, np.float32([row["order.final"] for row in rows]))
 
 
-def test_the_folder_says_what_was_run_and_holds_nothing_else(reference):
+def test_campaign_folder_says_what_was_run_and_holds_nothing_else(reference):
     found = json.loads((reference / "c" / "campaign.json").read_text())
     assert sorted(path.name for path in (reference / "c").iterdir()) == [
         "campaign.json", "scenario", "series", "summary.parquet"
@@ -130,9 +130,7 @@ def test_chosen_seeds_are_recorded_in_full(tmp_path, scenario, here):
     assert recorded.summary["trajectory_sha256"] == [rows_in(tmp_path / "c")[3]["trajectory_sha256"]]
 
 
-def test_where_workers_cannot_write_here_recorded_runs_are_done_on_this_machine_at_the_end(
-    tmp_path, scenario, monkeypatch
-):
+def test_recorded_runs_are_local_and_last_where_workers_cannot_write_here(tmp_path, scenario, monkeypatch):
     done_by, there, local = list[tuple[str, int]](), InThisProcess(), InThisProcess()
     there.records = False
     for name, executor in (("there", there), ("local", local)):
@@ -182,7 +180,7 @@ def test_arenas_that_stop_and_times_of_metrics_are_the_same_packed_and_alone(tmp
     ]  # fmt: skip
 
 
-def test_an_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling, here):
+def test_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling, here):
     done = sweep(stumbling, seeds=4, out=tmp_path / "c", batch=4)
     rows = rows_in(tmp_path / "c")
     failed = [row["seed"] for row in rows if row["ended"] == "failed"]
@@ -199,14 +197,14 @@ def test_an_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling,
     assert rows_in(tmp_path / "unpacked") == rows
 
 
-def test_a_seed_without_room_is_a_failed_row(tmp_path, scenario, here):
+def test_seed_without_room_is_a_failed_row(tmp_path, scenario, here):
     crowd = ["robots.pair.count=20", 'robots.pair.place={how="disc", radius_m=0.05}']
     done = sweep(scenario, seeds=2, out=tmp_path / "c", overrides=crowd)
     assert done.failed == 2
     assert "room" in rows_in(tmp_path / "c")[0]["error"]
 
 
-def test_a_metric_of_ones_own_that_raises_is_a_failed_row(tmp_path, scenario, here):
+def test_custom_metric_that_raises_is_a_failed_row(tmp_path, scenario, here):
     (tmp_path / "bad.py").write_text(
         "from dataclasses import dataclass\nfrom swarmwire.metrics.measures.metric import Metric\n"
         "@dataclass(frozen=True)\nclass Bad(Metric):\n    name = 'bad'; help = ''; bounds = (0.0, None)\n"
@@ -216,7 +214,7 @@ def test_a_metric_of_ones_own_that_raises_is_a_failed_row(tmp_path, scenario, he
     assert "no number" in rows_in(tmp_path / "c")[1]["error"]
 
 
-def test_an_error_that_no_file_can_hold_is_told_as_far_as_it_can(tmp_path, scenario, here):
+def test_error_with_text_that_no_file_can_hold_is_recorded_with_substitutes(tmp_path, scenario, here):
     agent = (
         "from swarmwire.agent import Agent\nclass Odd(Agent):\n    def step(self, robot): raise OSError('a\\udc80b')\n"
     )
@@ -225,7 +223,7 @@ def test_an_error_that_no_file_can_hold_is_told_as_far_as_it_can(tmp_path, scena
     assert "OSError: a?b" in rows_in(tmp_path / "c")[0]["error"]
 
 
-def test_an_agent_that_calls_itself_for_ever_fails_alike_in_any_pack(tmp_path, scenario, here):
+def test_agent_with_endless_recursion_fails_alike_in_any_pack(tmp_path, scenario, here):
     agent = "from swarmwire.agent import Agent\nclass Deep(Agent):\n    def step(self, robot): self.step(robot)\n"
     (tmp_path / "deep.py").write_text(agent)
     for batch in (1, 2):
@@ -240,7 +238,7 @@ def typed(monkeypatch, capsys, here):
     return lambda *arguments: called(monkeypatch, capsys, *arguments)
 
 
-def test_a_sweep_says_what_it_did_and_what_to_do_next(tmp_path, scenario, typed):
+def test_sweep_prints_what_it_did_and_what_to_do_next(tmp_path, scenario, typed):
     folder = tmp_path / "c"
     code, out, errors = typed(
         "sweep", scenario, "--vary", "radio.loss=0:0.5:2", "--seeds", "3", "--set", "duration_s=0.3", "--out", folder
@@ -265,7 +263,7 @@ def test_seeds_mean_the_same_to_run_to_sweep_and_in_a_campaigns_file(tmp_path, s
         assert json.loads((tmp_path / written).read_text())["seeds"] == [1, 2]
 
 
-def test_a_campaigns_file_says_the_same_as_options_which_go_first(tmp_path, scenario, typed):
+def test_campaign_file_means_the_same_as_options_which_override_it(tmp_path, scenario, typed):
     (tmp_path / "losses.toml").write_text(CAMPAIGN)
     assert typed("sweep", tmp_path / "losses.toml", "--out", tmp_path / "a")[0] == 0
     options = ("--vary", "radio.loss=0:0.5:2", "--vary", "robots.pair.count=3", "--seeds", "2")
@@ -293,7 +291,7 @@ def test_a_campaigns_file_says_the_same_as_options_which_go_first(tmp_path, scen
         ("overrides = [3]", r"overrides\[0\]: "),
     ],
 )
-def test_a_campaigns_file_is_refused_by_its_key(tmp_path, scenario, typed, line, told):
+def test_campaign_file_that_is_invalid_is_refused_in_a_line(tmp_path, scenario, typed, line, told):
     keys = {"format": "1", "scenario": "'two.toml'", "seeds": "2"} | dict([line.split(" = ", 1)])
     file = tmp_path / "campaign.toml"
     file.write_text("\n".join(f"{key} = {value}" for key, value in keys.items()))
@@ -318,9 +316,7 @@ def test_a_campaigns_file_is_refused_by_its_key(tmp_path, scenario, typed, line,
         (["two.toml", "--seeds", "2", "--record-seeds", "9"], "--record-seeds: "),
     ],
 )
-def test_what_cannot_be_run_is_refused_in_a_line_before_anything_is(
-    tmp_path, scenario, typed, monkeypatch, arguments, told
-):
+def test_sweep_options_that_are_invalid_are_refused_in_a_line(tmp_path, scenario, typed, monkeypatch, arguments, told):
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
     code, out, errors = typed("sweep", *arguments)
@@ -344,7 +340,7 @@ def test_resume_takes_the_same_campaign_alone(tmp_path, scenario, typed):
         assert errors.startswith(f"error: --resume {folder}: {key}: ")
 
 
-def test_a_run_is_repeated_by_its_number(tmp_path, scenario, typed):
+def test_repeat_of_a_campaign_takes_the_number_of_a_run(tmp_path, scenario, typed):
     folder = tmp_path / "c"
     typed("sweep", scenario, "--vary", "radio.loss=0,0.5", "--seeds", "4:6", "--out", folder)
     code, out, errors = typed("repeat", folder, "--run", "3", "--out", tmp_path / "again")

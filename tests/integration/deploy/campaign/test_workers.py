@@ -22,7 +22,7 @@ VARY = {"radio.loss": [0.0, 0.5]}
 DEADLY = 2  # one of the seeds that stumble
 
 
-def test_two_workers_come_to_the_rows_and_series_of_this_process(tmp_path, stumbling, monkeypatch):
+def test_workers_give_the_rows_and_series_of_this_process(tmp_path, stumbling, monkeypatch):
     asked = {"seeds": 4, "vary": VARY, "batch": 1}
     assert sweep(stumbling, out=tmp_path / "there", workers=2, **asked).is_over
     monkeypatch.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
@@ -44,7 +44,7 @@ def tasks_of(scenario, *seeds, overrides=()):
     return [Task(str(scenario), overrides, 0, (seed,), (seed,)) for seed in seeds]
 
 
-def test_a_worker_that_dies_is_replaced_and_a_seed_of_which_they_die_is_a_failed_row(stumbling):
+def test_worker_that_dies_is_replaced_and_its_deadly_seed_is_a_failed_row(stumbling):
     executor, rows = LocalExecutor(1), []
     tasks = tasks_of(stumbling, 1, DEADLY, 4, overrides=('robots.pair.params.how="kill"',))
     try:
@@ -57,7 +57,7 @@ def test_a_worker_that_dies_is_replaced_and_a_seed_of_which_they_die_is_a_failed
     assert rows[1] == {"run": 2, "point": 0, "seed": DEADLY, "ended": "failed"}
 
 
-def test_an_agent_that_asks_for_input_gets_none_and_takes_no_task(scenario):
+def test_agent_that_asks_for_input_gets_none_and_takes_no_task(scenario):
     agent = "from swarmwire.agent import Agent\nclass Asking(Agent):\n    def step(self, robot): input('go on? ')\n"
     (scenario.parent / "asking.py").write_text(agent)
     executor, rows = LocalExecutor(1), []
@@ -104,7 +104,7 @@ class WhileFrozen(FakeClock):
 
 
 @pytest.mark.parametrize(("always", "ended"), [(False, "duration"), (True, "failed")])
-def test_a_worker_that_is_frozen_is_ended_and_its_runs_are_done_by_another(scenario, monkeypatch, always, ended):
+def test_worker_that_is_frozen_is_ended_and_its_runs_are_done_by_another(scenario, monkeypatch, always, ended):
     monkeypatch.setattr(local, "Silence", lambda: Silence(WhileFrozen(), max_s=2.0))
     (scenario.parent / "frozen.py").write_text(FROZEN)
     executor, rows = LocalExecutor(1), []
@@ -132,7 +132,7 @@ sweep(sys.argv[1], seeds=4, vary=vary, batch=1, workers=1, out=sys.argv[2], obse
 """
 
 
-def test_a_campaign_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path, here):
+def test_campaign_that_is_killed_leaves_no_worker_and_can_be_resumed(tmp_path, here):
     scenario, folder = scenario_in(tmp_path), tmp_path / "c"
     command = [sys.executable, "-c", KILLED, str(scenario), str(folder), "radio.loss", "0.0", "0.5"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
@@ -151,7 +151,7 @@ def test_a_campaign_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path
     same(folder, tmp_path / "whole")
 
 
-def test_a_worker_ends_with_its_campaign_also_in_the_middle_of_a_run(tmp_path):
+def test_worker_ends_with_its_campaign_also_in_the_middle_of_a_run(tmp_path):
     """Of runs of half a second, and of a day, which would take minutes."""
     asked = (str(scenario_in(tmp_path)), str(tmp_path / "c"), "duration_s", "0.5", "100000.0")
     with subprocess.Popen(

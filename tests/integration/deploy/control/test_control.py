@@ -61,7 +61,7 @@ def process(tmp_path):
         process.kill()
 
 
-def test_a_run_in_another_process_is_found_changed_killed_and_repeated(tmp_path, process):
+def test_ctl_finds_changes_and_kills_in_a_run_that_is_repeated(tmp_path, process):
     ctl("pause")
     now = until(status, lambda status: status["state"] == "paused")
     tick = now["tick"]
@@ -102,7 +102,7 @@ def test_speed_resume_and_stop_end_a_run_with_its_summary(tmp_path, process):
         ctl("pause")
 
 
-def test_of_several_runs_there_is_a_table(tmp_path, process):
+def test_ctl_status_of_several_runs_is_a_table(tmp_path, process):
     with started(LOSSY, "--set", "duration_s=100000", "--out", tmp_path / "other") as other:
         try:
             until(lambda: read_live(tmp_path / "other"))
@@ -118,7 +118,7 @@ def test_of_several_runs_there_is_a_table(tmp_path, process):
             other.kill()
 
 
-def test_the_status_tells_how_the_run_is_doing(tmp_path):
+def test_status_has_the_progress_of_a_run(tmp_path):
     with going(tmp_path / "run", SHORT, runners=2) as (simulation, control):
         control.step(2)
         at_tick(control, 2)
@@ -182,7 +182,7 @@ def session_of_people(control: RemoteControl) -> None:
 
 
 @pytest.mark.parametrize(("then", "now"), [(None, 3), (3, None)])
-def test_an_interactive_session_is_repeated_bit_for_bit_in_whatever_layout(tmp_path, then, now):
+def test_interactive_session_is_repeated_bit_for_bit_in_any_layout(tmp_path, then, now):
     with going(tmp_path / "run", SHORT, runners=then) as (simulation, control):
         session_of_people(control)
     result = simulation.result
@@ -197,7 +197,7 @@ def test_an_interactive_session_is_repeated_bit_for_bit_in_whatever_layout(tmp_p
     assert repeat(tmp_path / "again").same
 
 
-def test_an_interactive_session_in_real_time_is_repeated(tmp_path):
+def test_interactive_session_in_real_time_is_repeated(tmp_path):
     with going(tmp_path / "run", "duration_s=3", realtime=20, runners=2) as (simulation, control):
         session_of_people(control)
         control.speed(100)
@@ -207,7 +207,7 @@ def test_an_interactive_session_in_real_time_is_repeated(tmp_path):
     assert repetition.result.events == simulation.result.events
 
 
-def test_what_people_did_from_python_and_an_altered_record_are_noticed(tmp_path):
+def test_live_events_from_python_are_repeated_and_an_altered_record_noticed(tmp_path):
     with Simulation(LOSSY, overrides=[SHORT], out=tmp_path / "run") as simulation:
         simulation.run(5)
         number = simulation.apply_event(KILL)
@@ -266,7 +266,7 @@ def endpoint(certs, controls) -> Iterator[str]:
         del kept, token
 
 
-def test_an_operator_controls_and_an_observer_looks(certs, controls, endpoint, monkeypatch):
+def test_operator_controls_a_run_and_an_observer_only_looks(certs, controls, endpoint, monkeypatch):
     monkeypatch.setattr(remote_control, "ANSWER_S", 3.0)
     operator = member("operator", certs=certs).network
     with controlling(endpoint, only_run_at(endpoint, operator), operator) as control:
@@ -288,14 +288,14 @@ def test_an_operator_controls_and_an_observer_looks(certs, controls, endpoint, m
         only_run_at(endpoint, runner)
 
 
-def test_who_is_of_another_authority_is_told_that_a_certificate_may_be_at_fault(tmp_path, endpoint):
+def test_certificate_of_another_authority_is_named_as_a_possible_cause(tmp_path, endpoint):
     begin_authority(tmp_path / "ca", WallClock())
     issue(tmp_path / "ca", [certificate_request("operator", [], "operator")], 2, WallClock())
     with pytest.raises(RunGone, match="cannot be reached.*certificate"):
         only_run_at(endpoint, member("operator", certs=tmp_path / "ca").network)
 
 
-def test_the_command_line_takes_a_folder_of_certificates(certs, controls, endpoint):
+def test_ctl_takes_a_folder_of_certificates(certs, controls, endpoint):
     called = CliRunner().invoke(
         app,
         ["ctl", "--endpoint", endpoint, "--certs", str(certs), "--name", "operator", "step", "3"],

@@ -397,7 +397,7 @@ def test_fetch_replaces_only_logs(robots, host, tmp_path):
     assert lines[0].startswith(f"error: --fetch: {tmp_path}/file: ")
 
 
-def test_one_host_drives_two_crazyflies_over_two_radios(fleet, robots, impatient):
+def test_host_drives_two_crazyflies_over_two_radios(fleet, robots, impatient):
     sheet = ROOT / "scenarios" / "robots" / "crazyflie.toml"
     (fleet.folder / "crazyflie.toml").write_bytes(sheet.read_bytes())
     fleet.table["defaults"] |= {"body": "crazyflie.toml", "driver": {"name": "crazyflie"}}

@@ -41,7 +41,7 @@ range_m = 3.0
 """
 
 
-def test_they_send_packets_over_the_robots_own_network(tmp_path: Path) -> None:
+def test_crazyflie_agents_send_packets_over_the_robots_own_network(tmp_path: Path) -> None:
     (tmp_path / "calling.py").write_text(AGENT)
     (tmp_path / "two.toml").write_text(SCENARIO)
     run = [sys.executable, "-m", "swarmwire.deploy", "run", tmp_path / "two.toml", "--gateway", "crazyflie"]

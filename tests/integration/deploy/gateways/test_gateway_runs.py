@@ -100,7 +100,7 @@ def test_robots_do_what_programs_tell_them_and_others_what_their_agents_decide(s
         assert len(scripted[0].published) == 10
 
 
-def test_the_summary_says_that_it_was_real_time_and_which_gateways_there_were(scenario, scripted, tmp_path) -> None:
+def test_summary_names_real_time_and_the_gateways(scenario, scripted, tmp_path) -> None:
     result = driven(scenario, scripted, tmp_path / "run").result
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert (result.mode, result.facts.gateways) == ("realtime", {"other": "scripted"})
@@ -113,7 +113,7 @@ def test_the_summary_says_that_it_was_real_time_and_which_gateways_there_were(sc
     assert (result.inputs.first_tick, result.inputs.ticks) == (0, 20)
 
 
-def test_it_is_repeated_bit_for_bit_without_its_gateways(scenario, scripted, tmp_path) -> None:
+def test_gateway_run_is_repeated_bit_for_bit_without_its_gateways(scenario, scripted, tmp_path) -> None:
     driven(scenario, scripted, tmp_path / "run")
     repetition = repeat(tmp_path / "run")
     assert repetition.same
@@ -123,7 +123,7 @@ def test_it_is_repeated_bit_for_bit_without_its_gateways(scenario, scripted, tmp
         repeat(tmp_path / "run")
 
 
-def test_one_that_was_killed_cannot_be_repeated_without_what_programs_told(scenario, scripted, tmp_path) -> None:
+def test_gateway_run_that_was_killed_cannot_be_repeated_without_its_inputs(scenario, scripted, tmp_path) -> None:
     driven(scenario, scripted, tmp_path / "run")
     (tmp_path / "run" / "inputs" / "actions.frames").unlink()
     (tmp_path / "run" / "summary.json").unlink()
@@ -154,20 +154,20 @@ def test_settings_of_each_robot_are_left_in_the_run_folder(scenario, scripted, t
     assert all(at.startswith("tcp/127.0.0.1:") and not at.endswith(":0") for at in (first, second, third))
 
 
-def test_its_speed_stays_whatever_people_press_since_programs_elsewhere_keep_to_it(scenario, scripted) -> None:
+def test_gateway_run_keeps_its_speed_as_outside_programs_rely_on_it(scenario, scripted) -> None:
     with Simulation(scenario, gateways="scripted", realtime=FAST) as simulation:
         simulation.controls.faster()
         simulation.controls.slower()
         assert simulation.controls.speed == FAST
 
 
-def test_the_dead_are_told_as_dead(scenario, scripted) -> None:
+def test_dead_robots_are_published_as_dead_to_gateways(scenario, scripted) -> None:
     kill = ["events=[{at_s=0.5, do='kill', robots={group='other', count=1}}]", "duration_s=1"]
     run(scenario, gateways={"other": "scripted"}, realtime=FAST, overrides=kill)
     assert [told.alive.sum() for told in scripted[0].published] == [3] * 5 + [2] * 5
 
 
-def test_the_command_line_prints_a_line_for_each_robot_that_can_be_driven(
+def test_command_line_prints_a_line_for_each_robot_that_can_be_driven(
     scenario, scripted, tmp_path, monkeypatch, capsys
 ) -> None:
     arguments = ("run", scenario, "--gateway", "other=scripted", "--gateway-set", "first=5", "--realtime=100")
@@ -183,7 +183,7 @@ def test_the_command_line_prints_a_line_for_each_robot_that_can_be_driven(
     assert any("behind gateways: other (scripted)" in line for line in lines)
 
 
-def test_a_body_that_is_another_robot_than_its_gateway_emulates_is_told_of_at_the_start(
+def test_body_that_differs_from_the_emulated_robot_is_reported_at_the_start(
     scenario, scripted, capsys, monkeypatch
 ) -> None:
     with Simulation(scenario, gateways={"own": "scripted"}, realtime=FAST):
@@ -219,7 +219,7 @@ def test_with_a_subtick_it_is_repeated_bit_for_bit_too(scenario, scripted, tmp_p
     assert repetition.result.radio == result.radio
 
 
-def test_they_find_one_heading_together(tmp_path) -> None:
+def test_flock_of_driven_and_emulated_robots_finds_one_heading(tmp_path) -> None:
     scenario = tmp_path / "mixed.toml"
     scenario.write_text(MIXED)
     result = driven_run(scenario, {"outside": "epuck2"}, tmp_path / "run", pace=4.0)
@@ -241,7 +241,7 @@ def final(result: Result, metric: str) -> float:
     return value
 
 
-def test_all_of_them_are_tried_here_and_are_small_enough_for_a_desk() -> None:
+def test_scenarios_for_gateways_are_all_tested_and_fit_on_a_desk() -> None:
     names = {path.stem for path in FOLDER.glob("*.toml")} - BODY_FILES
     on_the_ground = {f"{behaviour}-{body}" for behaviour in ("avoidance", "flocking", "pso") for body in BODIES}
     assert names == {*on_the_ground, "avoidance-turtlebot4", "avoidance-crazyflie"}
@@ -259,7 +259,7 @@ def test_wanderers_touch_nothing(body) -> None:
 
 
 @pytest.mark.parametrize("body", BODIES)
-def test_a_flock_finds_one_heading(body) -> None:
+def test_flock_behind_a_gateway_finds_one_heading(body) -> None:
     result = shipped("flocking", body)
     assert (result.metrics["order"].min or 0.0) < 0.8
     assert final(result, "order") > 0.9
@@ -292,7 +292,7 @@ def test_people_are_told_whom_nobody_drives(scenario, scripted, tmp_path, capsys
     assert (early, late) == ([f"no program drives {rest}"], [f"no program drove {rest}"])
 
 
-def test_what_is_said_soon_is_said_in_wall_time(scenario, scripted, capsys) -> None:
+def test_undriven_robots_are_reported_after_wall_time_not_simulated_time(scenario, scripted, capsys) -> None:
     with Simulation(scenario, gateways="scripted", realtime=100) as simulation:
         simulation.run(15)
         assert "no program dr" not in capsys.readouterr().err
@@ -306,7 +306,7 @@ def test_few_are_named(scenario, scripted, capsys) -> None:
     assert line == "no program drove other-0, other-1, other-2, other-3, other-4, other-5 and 2 more"
 
 
-def test_one_that_dies_or_is_revived_comes_to_rest_undriven(scenario, scripted, capsys) -> None:
+def test_robot_that_dies_or_is_revived_comes_to_rest_undriven(scenario, scripted, capsys) -> None:
     events = [
         "events=[{at_s=0.2, do='kill', robots={group='other'}}, {at_s=0.6, do='revive', robots={group='other'}}]",
     ]
@@ -318,7 +318,7 @@ def test_one_that_dies_or_is_revived_comes_to_rest_undriven(scenario, scripted, 
     assert "no program drove other-0" in capsys.readouterr().err
 
 
-def test_a_program_of_plain_sockets_turns_a_robot(tmp_path) -> None:
+def test_program_of_plain_sockets_turns_a_robot(tmp_path) -> None:
     scenario = ROOT / "scenarios" / "robots" / "avoidance-epuck2.toml"
     with Simulation(scenario, gateways="epuck2", overrides=["robots.wanderers.count=2"], realtime=20) as simulation:
         assert simulation.served is not None
@@ -342,7 +342,7 @@ def test_a_program_of_plain_sockets_turns_a_robot(tmp_path) -> None:
     assert turned[1] == pytest.approx(2 * 300 * 0.12566e-3 / 0.053, rel=0.05)
 
 
-def test_the_printed_command_drives_the_robot(tmp_path) -> None:
+def test_printed_command_drives_the_robot(tmp_path) -> None:
     command = [sys.executable, "-m", "swarmwire.deploy", "run", SCENARIO, "--gateway", "epuck2", "--realtime=2"]
     more = ["--set", "robots.flock.count=2", "--out", tmp_path / "run", "--no-rrd"]
     with subprocess.Popen([*command, *more], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as run:

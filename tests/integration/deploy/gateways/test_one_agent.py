@@ -13,7 +13,7 @@ MAX_MISSED = 0.1  # of the ticks: a machine that did not keep up tells nothing o
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name == "e-puck2" else pytest.mark.slow) for name in CASES]
 )
-def test_a_process_per_robot_moves_them_the_same_bit_for_bit(name: str) -> None:
+def test_process_per_robot_moves_robots_the_same_bit_for_bit(name: str) -> None:
     assert is_same_per_process(CASES[name], DURATION_S)
 
 

@@ -99,13 +99,13 @@ def test_agents_through_a_gateway_come_to_what_emulated_ones_do(behaviour, body,
     ("behaviour", "body"),
     [pytest.param(*case, marks=() if case == ("flocking", "epuck2") else pytest.mark.slow) for case in ALL],
 )
-def test_a_driver_that_turns_the_wrong_way_is_found_out(behaviour, body, tmp_path) -> None:
+def test_driver_that_turns_the_wrong_way_is_outside_the_spread(behaviour, body, tmp_path) -> None:
     expected = spread(behaviour, body, QUICK)
     found, _ = through_gateway(behaviour, body, tmp_path, broken=True)
     assert outside(found, expected, CASES[behaviour].judged), found
 
 
-def test_a_flock_whose_robots_speak_over_their_own_network_comes_to_what_an_emulated_one_does(tmp_path) -> None:
+def test_flock_over_the_robots_own_network_matches_an_emulated_one(tmp_path) -> None:
     """Range and bearing are from poses that the run tells as a tracker would."""
     expected = spread("flocking", "epuck2", QUICK)
     found, result = through_gateway("flocking", "epuck2", tmp_path, radio="zenoh")

@@ -49,7 +49,7 @@ class Chatter(Agent):
 
 @needs_program("ping", "tshark")
 @pytest.mark.parametrize("radio", RADIOS)
-def test_a_capture_has_frames_that_tshark_dissects_beside_messages(tmp_path, radio):
+def test_capture_has_frames_that_tshark_dissects_beside_messages(tmp_path, radio):
     scenario = line(2).replace("still.py:Still", "chatter.py:Chatter") + RADIOS[radio]
     options = ("--packets", "all", "--links", "--set", "duration_s=6")
     with running(tmp_path, scenario, *options, files={"chatter.py": CHATTER}) as world:

@@ -200,7 +200,7 @@ def test_babeld_routes_over_many_hops_and_around_a_dead_robot(tmp_path):
 
 
 @needs_program("babeld", "ping", "ip")
-def test_each_half_of_a_flock_that_splits_keeps_its_routes_until_it_is_whole_again(tmp_path):
+def test_halves_of_a_split_flock_keep_their_routes_until_rejoined(tmp_path):
     """Six robots in a line of two hops each half; a partition in the middle parts them for some seconds."""
 
     def reach(pair: tuple[str, str]) -> bool:

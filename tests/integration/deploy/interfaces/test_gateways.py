@@ -80,7 +80,7 @@ def output(world: InterfacesRun, robot: str) -> str:
     return path.read_text() if path.exists() else ""
 
 
-def test_a_program_drives_its_robot_through_the_gateway_in_its_namespace(tmp_path):
+def test_program_drives_its_robot_through_the_gateway_in_its_namespace(tmp_path):
     scenario = driven(2, sys.executable, "driver.py", seconds=3)
     with running(tmp_path, scenario, "--gateway", "epuck2", files={"driver.py": EPUCK2_DRIVER}) as world:
         assert world.process.wait(60) == 0
@@ -113,7 +113,7 @@ def test_ros_nodes_find_the_router_of_their_robot_and_no_node_of_another(tmp_pat
         ("tcp/192.0.2.7:7447", "--gateway: expected an address that robots have"),
     ],
 )
-def test_an_address_that_no_robot_can_have_is_refused(tmp_path, address, expected):
+def test_gateway_address_that_no_robot_can_have_is_refused(tmp_path, address, expected):
     pytest.importorskip("rosbags", reason="needs the extra [ros2]")
     (tmp_path / "still.py").write_text(STILL)
     (tmp_path / "scenario.toml").write_text(driven(1, "true") + "[radio.interface]")

@@ -78,7 +78,7 @@ def test_ping_takes_the_radio_s_latency_twice_and_only_in_range(tmp_path, to):
 
 
 @needs_program("ping")
-def test_a_run_with_frames_and_messages_is_repeated_bit_for_bit(tmp_path):
+def test_run_with_frames_and_messages_is_repeated_bit_for_bit(tmp_path):
     scenario = line(3).replace("still.py:Still", "chatter.py:Chatter") + DISK + "loss = 0.3\njitter_s = 0.01"
     with running(tmp_path, scenario, "--packets", "all", files={"chatter.py": CHATTER}) as world:
         world.on("line-0", "ping", "-c", "10", "-i", "0.05", "-s", "1000", world.address("line-1"))
@@ -106,7 +106,7 @@ def test_messages_stay_out_of_devices(tmp_path):
     assert radio["fates"]["received"] > len(types) + 5
 
 
-def test_a_killed_world_leaves_nothing(tmp_path):
+def test_killed_world_leaves_neither_processes_nor_devices(tmp_path):
     with running(tmp_path, line(3) + DISK) as world:
         sleeper = subprocess.Popen(
             world.command("line-1", "sh", "-c", "sleep 1000 & (setsid sleep 1000 &) ; sleep 1000")

@@ -28,7 +28,7 @@ def output(folder: Path, robot: str) -> str:
     return path.read_text() if path.exists() else ""
 
 
-def test_a_program_knows_its_robot_and_its_output_and_end_are_kept(tmp_path):
+def test_program_knows_its_robot_and_its_output_and_end_are_kept(tmp_path):
     script = 'env | grep ^ROBOT; hostname; cat /sys/class/net/radio0/address; pwd; touch "$ROBOT_SCRATCH/mine"; exit 7'
     scenario = with_program(line(2), "sh", "-c", script).replace("3600", "2") + DISK
     with running(tmp_path, scenario, "--packets", "all") as world:
@@ -52,7 +52,7 @@ def test_a_program_knows_its_robot_and_its_output_and_end_are_kept(tmp_path):
     assert repeat(world.folder).same
 
 
-def test_the_first_of_programs_that_fail_alike_is_reported_with_its_last_line(tmp_path):
+def test_programs_that_fail_alike_are_reported_once_with_the_last_line(tmp_path):
     script = 'echo starting; echo "no map of $ROBOT"; test $ROBOT = line-2 || exit 7'
     scenario = with_program(line(3), "sh", "-c", script).replace("3600", "2") + DISK
     with running(tmp_path, scenario) as world:
@@ -66,7 +66,7 @@ def sleepers_of(pid: int) -> list[psutil.Process]:
     return [process for process in psutil.Process(pid).children(recursive=True) if process.name() == "sleep"]
 
 
-def test_a_program_dies_with_its_robot_and_starts_when_it_is_revived(tmp_path):
+def test_program_dies_with_its_robot_and_starts_when_it_is_revived(tmp_path):
     script = "trap '' TERM; echo started; sleep 1000 & wait"
     kill = '\n[[events]]\ndo = "kill"\nrobots = { names = ["line-0"] }\nat_s = 0.5\nfor_s = 0.5\n'
     with running(tmp_path, with_program(line(2), "sh", "-c", script) + DISK + kill) as world:
@@ -93,7 +93,7 @@ def test_exec_runs_a_command_on_a_robot_which_knows_the_others_by_name(tmp_path)
     assert "expected the folder of a running simulation with network interfaces" in over.stderr
 
 
-def test_a_program_that_is_not_there_or_has_no_network_is_refused_before_anything_is_made(tmp_path):
+def test_program_that_is_missing_or_has_no_network_is_refused_at_the_start(tmp_path):
     (tmp_path / "still.py").write_text(STILL)
     path = tmp_path / "scenario.toml"
     path.write_text(with_program(line(1), "no-such-program") + DISK + "[radio.interface]")

@@ -46,7 +46,7 @@ def summary(out: Path) -> dict[str, object]:
     return json.loads((out / "summary.json").read_text())
 
 
-def test_a_run_across_three_machines_is_the_run_of_one_process(tmp_path):
+def test_machines_with_a_router_between_run_as_one_process_does(tmp_path):
     with machines(3) as (far, between, near):
         certs = lab(tmp_path / "ca", {"world": far.addresses, "gate": between.addresses}, "r1", "r2")
         at, through = (f"tls/{address}:7447" for address in (far.addresses[0], between.addresses[1]))
@@ -77,7 +77,7 @@ def test_nobody_gets_past_a_machine_without_a_router(tmp_path):
 
 
 @pytest.mark.slow  # the runner waits for ten seconds before it believes it
-def test_who_is_cut_off_is_told_at_both_ends_and_may_come_back(tmp_path):
+def test_runner_that_is_cut_off_is_reported_at_both_ends_and_may_return(tmp_path):
     settings = [word for setting in SETTINGS for word in ("--set", setting)]
     with machines(2) as (lab, laptop):
         at = f"tcp/{lab.addresses[0]}:7447"
@@ -214,7 +214,7 @@ def flood(world: GuardedWorld, name: str, opened: ExitStack) -> None:
         session.put(own, b"x", congestion_control=BLOCK)
 
 
-def test_who_floods_is_received_no_more_and_the_others_are(certs, undisturbed, tmp_path):
+def test_runner_that_floods_without_robots_is_ignored_and_others_are_not(certs, undisturbed, tmp_path):
     with ExitStack() as opened:
         result = GuardedWorld(certs, lambda world: flood(world, "mallory", opened)).run(tmp_path / "run")
     assert list(result.trajectory_sha256) == undisturbed
@@ -224,12 +224,12 @@ def test_who_floods_is_received_no_more_and_the_others_are(certs, undisturbed, t
     assert counts.keys() <= {"unknown_runner_frames", "wrong_tick_frames"}
 
 
-def test_a_runner_that_plays_and_floods_is_lost(certs, tmp_path):
+def test_runner_that_plays_and_floods_is_lost(certs, tmp_path):
     with ExitStack() as opened, pytest.raises(RunnerLost, match="far more than it was asked for"):
         GuardedWorld(certs, lambda world: flood(world, "r1", opened)).run(tmp_path / "run")
 
 
-def test_a_runner_that_plays_cannot_join_twice_nor_answer_for_others(certs, undisturbed, tmp_path):
+def test_runner_that_plays_can_neither_join_twice_nor_answer_for_others(certs, undisturbed, tmp_path):
     """The session has the name and the certificate of r1, which plays ten robots beside it."""
 
     def disturb(world: GuardedWorld) -> None:
@@ -253,7 +253,7 @@ def test_a_runner_that_plays_cannot_join_twice_nor_answer_for_others(certs, undi
     assert counts == {"refused_join": 1, "unexpected_kind_frames": 1}
 
 
-def test_no_certificate_of_this_ca_is_no_link(certs, undisturbed, tmp_path):
+def test_certificate_of_another_ca_makes_no_link(certs, undisturbed, tmp_path):
     others = authority(tmp_path / "other")
     foreign = Network(ca=certs / "ca.pem", certificate=others / "r0.pem", key=others / "r0.key")
 

@@ -65,20 +65,20 @@ def test_beyond_this_machine_it_warns_each_time_that_it_is_insecure():
         ("--listen", "unixsock-stream//nowhere/at/all", "--connect", "tcp/127.0.0.1:1"),
     ],
 )
-def test_a_bad_call_is_one_line(words, monkeypatch, capsys):
+def test_router_options_that_are_invalid_are_refused_in_a_line(words, monkeypatch, capsys):
     code, out, errors = called(monkeypatch, capsys, "router", *words)
     assert (code, out) == (2, "")
     assert errors.startswith("error: ")
     assert errors.count("\n") == 1
 
 
-def test_which_of_several_certificates_must_be_said(certs, monkeypatch, capsys):
+def test_router_with_several_certificates_needs_a_name(certs, monkeypatch, capsys):
     code, _, errors = called(monkeypatch, capsys, "router", *TLS, "--certs", certs)
     assert code == 2
     assert "gate, gate2" in errors
 
 
-def test_the_register_names_the_members_and_options_do_without_it(certs, tmp_path, monkeypatch, capsys):
+def test_router_admits_members_of_the_register_or_of_the_options(certs, tmp_path, monkeypatch, capsys):
     admitted: list[set[str]] = []
 
     def noted(_of: MemberCredentials, _listen: list[str], _connect: list[str], access: dict[str, Any]) -> None:
@@ -140,7 +140,7 @@ def simulation_of(joiners, act, *overrides):
     return simulation
 
 
-def test_a_run_goes_on_when_its_router_does_and_nothing_is_lost(joiners):
+def test_run_goes_on_after_its_router_was_frozen_and_loses_nothing(joiners):
     result = run_to_end(simulation_of(joiners, joiners.freeze_and_thaw_router))
     assert result.counts.get("runners_lost", 0) == 0
     assert result.trajectory_sha256 == run(LOSSY, overrides=[*joiners.overrides, "duration_s=2"]).trajectory_sha256
@@ -199,7 +199,7 @@ class BehindGuardedRouter(Joiners):
             self._join(name, "--names", ",".join(robots))
 
 
-def test_the_run_goes_on_where_it_was_and_says_what_happened(tmp_path):
+def test_run_goes_on_after_its_router_was_killed_and_reports_it(tmp_path):
     certs = lab(tmp_path / "ca", {"world": HERE, "gate": HERE}, *RUNNERS)
     with ExitStack() as opened:
         joiners = BehindGuardedRouter(tmp_path, certs, opened)

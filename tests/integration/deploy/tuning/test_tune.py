@@ -41,7 +41,7 @@ begin_tune(plan, Path(sys.argv[2]), "", 1, TuneObservers(Watcher(), NoObserver()
 
 
 @pytest.mark.usefixtures("calculated")
-def test_a_known_optimum_is_found(tmp_path, scenario):
+def test_known_optimum_is_found(tmp_path, scenario):
     found = tuned(scenario, tmp_path / "t", trials=24, seeds=1)
     assert found.is_over
     assert found.best.parameters["metrics.0.at"] == pytest.approx(0.7, abs=0.05)
@@ -53,7 +53,7 @@ def test_a_known_optimum_is_found(tmp_path, scenario):
 
 
 @pytest.mark.usefixtures("calculated")
-def test_the_best_is_checked_on_seeds_that_no_trial_had(tmp_path, scenario):
+def test_best_trial_is_checked_on_seeds_that_no_trial_had(tmp_path, scenario):
     found = tuned(scenario, tmp_path / "t", trials=4, seeds=3, check_seeds="5")
     own, best = (CampaignFolder(tmp_path / "t" / "check" / name) for name in ("baseline", f"trial-{found.best.number}"))
     assert own.about.seeds == best.about.seeds == (4, 5, 6, 7, 8)
@@ -89,7 +89,7 @@ def test_more_trials_are_those_of_a_longer_tuning(tmp_path, scenario):
 
 
 @pytest.mark.usefixtures("calculated")
-def test_a_half_written_line_of_a_killed_process_is_no_trial(tmp_path, scenario):
+def test_half_written_line_of_a_killed_process_is_no_trial(tmp_path, scenario):
     tuned(scenario, tmp_path / "whole", seeds=1, trials=5)
     tuned(scenario, tmp_path / "t", seeds=1, trials=5, until=1)
     journal = tmp_path / "t" / FILE
@@ -99,7 +99,7 @@ def test_a_half_written_line_of_a_killed_process_is_no_trial(tmp_path, scenario)
 
 
 @pytest.mark.usefixtures("calculated")
-def test_a_time_that_most_runs_do_not_reach_is_worse_than_any_that_they_do(tmp_path, scenario):
+def test_time_that_most_runs_do_not_reach_is_worse_than_any_reached(tmp_path, scenario):
     found = tuned(scenario, tmp_path / "t", "metrics.1.after_s=0.1:0.9", goal="min ready_s", trials=10)
     rows = trials_in(tmp_path / "t")
     late = rows.filter(pl.col("metrics.1.after_s") > 0.4)
@@ -127,7 +127,7 @@ def test_changed_files_and_other_code_are_refused(tmp_path, scenario):
 
 @pytest.mark.usefixtures("calculated")
 @pytest.mark.parametrize("text", [None, "{", "[]", '{"format": 1}', '{"format": 2}'])
-def test_a_folder_that_is_no_tuning_is_refused_in_a_line(tmp_path, text):
+def test_folder_without_a_tuning_is_refused_in_a_line(tmp_path, text):
     if text is not None:
         (tmp_path / "tuning.json").write_text(text)
     with pytest.raises(BadInput, match=f"^{tmp_path}.*expected ") as refused:
@@ -136,7 +136,7 @@ def test_a_folder_that_is_no_tuning_is_refused_in_a_line(tmp_path, text):
 
 
 @pytest.mark.usefixtures("here")
-def test_the_best_is_a_scenario_that_runs_from_the_folder_alone(tmp_path, scenario):
+def test_best_trial_is_a_scenario_that_runs_from_the_folder_alone(tmp_path, scenario):
     found = tuned(
         scenario, tmp_path / "t", AT, "robots.pair.count=2:4", trials=6, seeds=1, overrides=("duration_s=0.3",)
     )
@@ -167,7 +167,7 @@ def test_trials_that_fail_are_told_of_and_never_the_best(tmp_path, scenario):
 
 
 @pytest.mark.usefixtures("here")
-def test_where_all_trials_fail_it_ends_in_a_line(tmp_path, scenario):
+def test_tuning_in_which_all_trials_fail_raises_one_line(tmp_path, scenario):
     with pytest.raises(NothingFound, match="all 3 trials failed.*too fast") as ended:
         tuned(scenario, tmp_path / "t", "robots.pair.params.speed=0.6:1", trials=3)
     assert "\n" not in str(ended.value)
@@ -175,7 +175,7 @@ def test_where_all_trials_fail_it_ends_in_a_line(tmp_path, scenario):
 
 
 @pytest.mark.usefixtures("here")
-def test_where_values_are_no_good_together_that_trial_fails(tmp_path, scenario):
+def test_values_that_are_invalid_together_fail_their_trial(tmp_path, scenario):
     searched = ("robots.pair.count=2,60", "arena.size_m=[4.0, 4.0],[0.3, 0.3]")
     found = tuned(scenario, tmp_path / "t", *searched, trials=6, seeds=1)
     rows = trials_in(tmp_path / "t")
@@ -203,7 +203,7 @@ def typed(monkeypatch, capsys, calculated):
     return lambda *arguments: called(monkeypatch, capsys, *arguments)
 
 
-def test_a_tuning_says_what_it_found_what_that_is_worth_and_what_to_do_next(tmp_path, scenario, typed):
+def test_tune_command_prints_what_it_found_its_worth_and_what_to_do_next(tmp_path, scenario, typed):
     folder = tmp_path / "t"
     searched = ("--search", AT, "--search", "robots.pair.params.steps=1:8")
     code, out, errors = typed(
@@ -258,9 +258,7 @@ def test_a_tuning_says_what_it_found_what_that_is_worth_and_what_to_do_next(tmp_
         (["bowl.toml", "--resume", "nowhere"], "SCENARIO: .*--resume"),
     ],
 )
-def test_what_cannot_be_tuned_is_refused_in_a_line_before_anything_is(
-    tmp_path, scenario, typed, monkeypatch, arguments, told
-):
+def test_tune_options_that_are_invalid_are_refused_in_a_line(tmp_path, scenario, typed, monkeypatch, arguments, told):
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
     code, out, errors = typed("tune", *arguments)
@@ -300,7 +298,7 @@ def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monk
     assert re.search("6 trials x 1 seeds; 3 of them", out.splitlines()[0])
 
 
-def test_where_all_trials_fail_it_is_a_line_and_exit_code_1(tmp_path, scenario, monkeypatch, capsys, here):
+def test_tune_command_in_which_all_trials_fail_is_a_line_and_exit_code_1(tmp_path, scenario, monkeypatch, capsys, here):
     folder, searched = tmp_path / "t", "robots.pair.params.speed=0.6:1"
     arguments = ("--search", searched, *GOAL, "--trials", "2", "--seeds", "1", "--out", folder, "--quiet")
     code, out, errors = called(monkeypatch, capsys, "tune", scenario, *arguments)
@@ -308,7 +306,7 @@ def test_where_all_trials_fail_it_is_a_line_and_exit_code_1(tmp_path, scenario, 
     assert re.fullmatch(r"error: \S+: all 2 trials failed.* trial 0: ValueError: too fast.*\n", errors)
 
 
-def test_a_tuning_that_is_killed_leaves_no_worker_and_is_gone_on_with(tmp_path, typed):
+def test_tuning_that_is_killed_leaves_no_worker_and_can_be_resumed(tmp_path, typed):
     scenario, folder = scenario_in(tmp_path), tmp_path / "t"
     command = [sys.executable, "-c", KILLED, str(scenario), str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
