@@ -62,7 +62,7 @@ class Idle(Agent):
 """
 
 
-def test_the_sweep_has_a_row_for_each_loss_and_seed():
+def test_sweep_example_has_a_row_for_each_loss_and_seed():
     runs = table(FLOCK, 2, 2.0)
     assert runs.select("loss", "seed").rows() == [(loss, seed) for loss in LOSSES for seed in (1, 2)]
     delivered = runs.group_by("loss", maintain_order=True).agg(pl.col("link_pdr").mean())["link_pdr"]
@@ -79,12 +79,12 @@ def test_robots_with_an_own_sense_and_an_own_actuator_seal_the_leak():
 
 
 @pytest.mark.parametrize("runners", [3, "per-robot"])
-def test_the_leak_is_the_same_whoever_runs_the_agents(runners):
+def test_leak_example_is_the_same_in_any_layout(runners):
     short = ["duration_s=3"]
     assert run(GAS, overrides=short, runners=runners).trajectory_sha256 == run(GAS, overrides=short).trajectory_sha256
 
 
-def test_the_leak_can_be_repeated_from_its_run_folder_alone(tmp_path):
+def test_leak_example_is_repeated_from_its_run_folder_alone(tmp_path):
     for file in GAS.parent.iterdir():
         if file.is_file():
             (tmp_path / file.name).write_bytes(file.read_bytes())
@@ -100,7 +100,7 @@ def test_the_leak_can_be_repeated_from_its_run_folder_alone(tmp_path):
     assert repeat(tmp_path / "run").changes == ("files/gas.py is not as the run left it: its sha256 differs",)
 
 
-def test_the_sweep_prints_its_table():
+def test_sweep_example_prints_its_table():
     command = [sys.executable, EXAMPLES / "loss_sweep.py", "--seeds", "1", "--duration", "1"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[0].split("|")[1:-1] == [" loss ", " link_pdr ", " order    ", " runs "]
@@ -108,7 +108,7 @@ def test_the_sweep_prints_its_table():
 
 # jupyter_client warns of what will change in its own event loop, tornado of the same.
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::RuntimeWarning")
-def test_the_notebook_runs_from_top_to_bottom(monkeypatch):
+def test_notebook_runs_from_top_to_bottom(monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
     monkeypatch.setenv("PYTHONPATH", str(EXAMPLES.parent))
     monkeypatch.setenv("JUPYTER_PLATFORM_DIRS", "1")
@@ -137,7 +137,7 @@ def test_most_seekers_come_to_the_lamp(plain: Result):
 
 
 @pytest.mark.parametrize("way", ["state_machine", "behaviour_tree"])
-def test_every_way_moves_the_swarm_alike(way: str, plain: Result):
+def test_agent_styles_move_the_swarm_alike(way: str, plain: Result):
     assert run_of(way, 60.0).trajectory_sha256 == plain.trajectory_sha256
 
 
@@ -165,7 +165,7 @@ def with_own(folder: Path, flock: Scenario | Path, **more: Any) -> tuple[Result,
         return result, joiners.said("foreign")[0]
 
 
-def test_a_world_plays_with_it_as_with_an_agent_of_the_same_rule(tmp_path: Path) -> None:
+def test_foreign_program_plays_as_an_agent_of_the_same_rule_does(tmp_path: Path) -> None:
     """Beside a host with a process per robot."""
     flock = scenario().robots["flock"].model_copy(update={"agent": "tests.support.examples.protocol.boids:Boid"})
     boids = scenario(robots={"flock": flock})
@@ -178,7 +178,7 @@ def test_a_world_plays_with_it_as_with_an_agent_of_the_same_rule(tmp_path: Path)
     assert together.radio.fates["received"] > 2000
 
 
-def test_its_robots_and_those_of_swarmwire_hear_one_another(tmp_path: Path) -> None:
+def test_foreign_robots_and_those_of_swarmwire_hear_one_another(tmp_path: Path) -> None:
     assert Heading.tag == TAG
     result, code = with_own(tmp_path, scenario())
     assert code == 0
@@ -188,7 +188,7 @@ def test_its_robots_and_those_of_swarmwire_hear_one_another(tmp_path: Path) -> N
     assert order > 0.9
 
 
-def test_it_needs_nothing_but_zenoh_and_msgpack_and_is_short() -> None:
+def test_foreign_program_needs_only_zenoh_and_msgpack_and_is_short() -> None:
     text = PROGRAM.read_text(encoding="utf-8")
     modules = [alias.name for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import) for alias in node.names]
     modules += [str(node.module) for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
@@ -197,7 +197,7 @@ def test_it_needs_nothing_but_zenoh_and_msgpack_and_is_short() -> None:
     assert (VERSION, BROADCAST) == (frames.VERSION, sentinels.BROADCAST)
 
 
-def test_what_it_does_is_recorded_so_that_repeat_gives_the_same_run(tmp_path: Path) -> None:
+def test_foreign_program_is_recorded_so_that_repeat_gives_the_same_run(tmp_path: Path) -> None:
     """Its code is not in the run folder, and the scenario's agent does something else."""
     flock = EXAMPLES / "protocol" / "flock.toml"
     result, _ = with_own(tmp_path, flock, overrides=["duration_s=3"], out=tmp_path / "run")
@@ -236,7 +236,7 @@ def node(transport: str, endpoint: str, namespace: str, scanner_deg: float) -> G
 
 
 @pytest.mark.parametrize(("body", "scanner_deg"), [("turtlebot3-burger", 0.0), ("turtlebot4", 90.0)])
-def test_the_example_drives_ahead_and_turns_before_walls(body, scanner_deg, tmp_path):
+def test_ros2_example_drives_ahead_and_turns_before_walls(body, scanner_deg, tmp_path):
     (tmp_path / "two.toml").write_text(SCENARIO.replace("BODY", body))
     (tmp_path / "idle.py").write_text(IDLE)
     with Simulation(tmp_path / "two.toml") as compiled:  # in real time it would be behind at once

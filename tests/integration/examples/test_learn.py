@@ -14,7 +14,7 @@ GROUPS = {"flocking": "flock", "search": "swarm"}
 
 
 @pytest.mark.parametrize("policy", POLICIES, ids=lambda path: path.stem)
-def test_the_shipped_policies_drive_the_robots_of_their_scenario(policy: Path) -> None:
+def test_shipped_policies_drive_the_robots_of_their_scenario(policy: Path) -> None:
     task = policy.stem.partition("-")[0]
     group = GROUPS[task]
     overrides = [f"robots.{group}.agent={policy}", f"robots.{group}.params={{}}", "duration_s=10", 'metrics=["speed"]']
@@ -27,7 +27,7 @@ def test_the_shipped_policies_drive_the_robots_of_their_scenario(policy: Path) -
 @pytest.mark.timeout(300)
 @pytest.mark.filterwarnings("ignore::FutureWarning", "ignore::DeprecationWarning")  # of torch's exporter
 @pytest.mark.parametrize("task", GROUPS)
-def test_a_trained_network_gives_the_same_actions_in_onnxruntime_as_in_torch(task: str, tmp_path: Path) -> None:
+def test_trained_network_acts_the_same_in_onnxruntime_as_in_torch(task: str, tmp_path: Path) -> None:
     torch = pytest.importorskip("torch")
     pytest.importorskip("onnxscript")
     from examples.learn.train import TASKS, exported, train
