@@ -214,7 +214,9 @@ def _too_small(runners: int, expected: str, got: int, hint: str) -> BadInput:
 def refusal(error: BaseException) -> str | None:
     """Return a line with a remedy for an error of the machine (disk, files, memory, processes); None for others."""
     if isinstance(error, MemoryError):
-        return f"no memory is left: {error}".removesuffix(": ") + f" ({HINTS[errno.ENOMEM]})"
+        is_limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+        hint = "raise the limit: ulimit -v" if is_limited else HINTS[errno.ENOMEM]
+        return f"no memory is left: {error}".removesuffix(": ") + f" ({hint})"
     if isinstance(error, ImportError) and NO_SEGMENT in str(error):
         return f"no memory is left to load {Path(error.path or '').name or 'a library'} (raise the limit: ulimit -v)"
     if isinstance(error, RuntimeError) and NO_THREAD in str(error):

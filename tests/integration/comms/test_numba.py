@@ -23,7 +23,7 @@ def snapshot():
 
 numba.njit(lambda x: np.sqrt(x))(1.0)  # numba completes itself as it first compiles
 before = snapshot()
-for module in ("comms.radio.medium", "world.world", "metrics.measure", "deploy.simulation"):
+for module in ("comms.radio.medium", "world.world", "metrics.measures.measure", "deploy.runs.simulation"):
     importlib.import_module(f"swarmwire.{module}")
 from swarmwire.comms.base.kernels import njit
 assert njit(cache=False)(lambda x: np.sqrt(x))(4.0) == 2.0

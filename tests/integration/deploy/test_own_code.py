@@ -35,7 +35,7 @@ agent = "swarmwire.agent.behaviours:Avoidance"
 def test_paragraphs_of_help_are_as_wide_as_the_terminal(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "80")
     _, out, _ = called(monkeypatch, capsys, "robots", "deploy", "--help")
-    assert " and does not stop the others; to do it again does only what is missing. Robots" in out
+    assert "unchanged and does not stop the others; a repetition sends only what is" in out
     assert "  swarmwire robots deploy fleet.toml --group red --restart" in out
 
 

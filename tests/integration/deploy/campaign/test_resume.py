@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from swarmwire.comms.base.atomic import folder_lock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaigns import store
@@ -143,7 +144,7 @@ def test_folder_without_a_campaign_is_refused_in_a_line(tmp_path, text):
 
 
 def test_campaign_folder_is_for_one_process_at_a_time(whole):
-    with store.locked(whole, "campaign"), pytest.raises(BadInput, match="another process is at work"):
+    with folder_lock(whole, "campaign"), pytest.raises(BadInput, match="another process is at work"):
         resume(whole)
 
 

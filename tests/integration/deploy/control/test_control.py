@@ -267,7 +267,7 @@ def endpoint(certs, controls) -> Iterator[str]:
 
 
 def test_operator_controls_a_run_and_an_observer_only_looks(certs, controls, endpoint, monkeypatch):
-    monkeypatch.setattr(remote_control, "ANSWER_S", 3.0)
+    monkeypatch.setattr(remote_control, "ANSWER_TIMEOUT_S", 3.0)
     operator = member("operator", certs=certs).network
     with controlling(endpoint, only_run_at(endpoint, operator), operator) as control:
         assert (control.status()["run"], control.pause()["done"]) == ("r", "paused")

@@ -156,8 +156,8 @@ def test_settings_of_each_robot_are_left_in_the_run_folder(scenario, scripted, t
 
 def test_gateway_run_keeps_its_speed_as_outside_programs_rely_on_it(scenario, scripted) -> None:
     with Simulation(scenario, gateways="scripted", realtime=FAST) as simulation:
-        simulation.controls.faster()
-        simulation.controls.slower()
+        with pytest.raises(BadInput):
+            simulation.controls.set_speed(2.0 * FAST)
         assert simulation.controls.speed == FAST
 
 

@@ -110,7 +110,7 @@ def test_ros_nodes_find_the_router_of_their_robot_and_no_node_of_another(tmp_pat
     ("address", "expected"),
     [
         ("unixsock-stream/router", "ros2: address: expected an address such as tcp/127.0.0.1:7447 on robots with"),
-        ("tcp/192.0.2.7:7447", "--gateway: expected an address that robots have"),
+        ("tcp/192.0.2.7:7447", "gateways: expected an address that robots have"),
     ],
 )
 def test_gateway_address_that_no_robot_can_have_is_refused(tmp_path, address, expected):

@@ -13,7 +13,13 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import AgentFailed, BadFrame, BadInput
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.agent_memory import encode_memory
-from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, encode_reply, encode_request
+from swarmwire.comms.wire.control_frames import (
+    ControlRequest,
+    decode_reply,
+    decode_request,
+    encode_reply,
+    encode_request,
+)
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.deploy.live.page.server import MAX_ORDER_BYTES, Order, execute
 from swarmwire.deploy.runs.control_server import ControlServer
@@ -153,7 +159,7 @@ class Control(DocumentTarget):
             self._start()
         before = len(self.live_events._events)
         try:
-            self.server._do(case)
+            self.server.do(decode_request(case))
         except BadInput as error:
             check_line(error)
             if len(self.live_events._events) != before:
