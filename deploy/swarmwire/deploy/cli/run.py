@@ -7,6 +7,7 @@ import typer
 
 from swarmwire.deploy.cli.grouped import with_options
 from swarmwire.deploy.cli.run_options import RepeatOptions, RunCommandOptions
+from swarmwire.deploy.machine import need_address_space
 
 
 @with_options
@@ -19,6 +20,7 @@ def run_command(options: RunCommandOptions) -> None:
     settings for each robot are written into the run folder, or any other that speaks the robot's protocol. For example:
     --gateway epuck2, or --gateway flock=ros2@tcp/127.0.0.1:7447.
     """
+    need_address_space()  # before libraries are loaded, which may end the process if there is too little
     from swarmwire.deploy.cli.actions.run import run_scenario
 
     run_scenario(options)
@@ -33,6 +35,7 @@ def repeat_command(options: RepeatOptions) -> None:
     Exit code 0: the same, as far as recorded; 1: different, or there is nothing to compare with; 2: the folder
     holds no run that can be repeated.
     """
+    need_address_space()
     from swarmwire.deploy.cli.actions.repeat import repeat_run
 
     repeat_run(options)

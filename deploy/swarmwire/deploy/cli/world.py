@@ -9,6 +9,7 @@ import typer
 from swarmwire.deploy.cli.grouped import with_options
 from swarmwire.deploy.cli.options import AgentNetwork, Certs, Insecure, Isolate
 from swarmwire.deploy.cli.run_options import WorldOptions
+from swarmwire.deploy.machine import need_address_space
 
 
 @with_options
@@ -21,6 +22,7 @@ def world_command(options: WorldOptions) -> None:
 
       swarmwire world scenarios/flocking-lossy.toml --listen tls/0.0.0.0:7447 --certs lab-certs
     """
+    need_address_space()  # before libraries are loaded, which may end the process if there is too little
     from swarmwire.deploy.cli.actions.world import serve_world
 
     serve_world(options)
