@@ -36,7 +36,7 @@ TYPES: dict[type, str] = {
 }
 CLASS_ATTRIBUTES = "needs", "api"  # declared by the class, never parameters
 REQUIRED = object()  # default of a parameter without a default
-UNEXPLAINED = Bounds(help="")  # of a parameter that is declared without `parameter`
+UNEXPLAINED = Bounds(help="")  # bounds of a parameter declared without `parameter`
 
 
 class Parametrized:
@@ -46,6 +46,7 @@ class Parametrized:
     above=0.0)` also explains it for `swarmwire describe` and refuses other values before a run.
     """
 
+    # Names with an underscore can never be those of a user's parameters.
     _bounds: ClassVar[Mapping[str, Bounds]] = MappingProxyType({})
     _is_vector: ClassVar[bool] = False  # True if an instance controls many robots
 
@@ -105,12 +106,12 @@ class Parameter:
 def parameters_of(kind: type[Parametrized]) -> dict[str, Parameter]:
     """Return the parameters of an agent class, those of its bases first; TypeError for a type that no scenario has."""
     parameters: dict[str, Parameter] = {}
-    bounds = kind._bounds  # pyright: ignore[reportPrivateUsage]
+    bounds = kind._bounds  # pyright: ignore[reportPrivateUsage] - this module's own class
     for name, hint in get_type_hints(kind).items():
         if name.startswith("_") or name in CLASS_ATTRIBUTES or ClassVar in (hint, get_origin(hint)):
             continue
         per_robot = get_origin(hint) is PerRobot
-        if per_robot and not kind._is_vector:  # pyright: ignore[reportPrivateUsage]
+        if per_robot and not kind._is_vector:  # pyright: ignore[reportPrivateUsage] - this module's own class
             raise TypeError(f"{kind.__name__}.{name}: only a VectorAgent has parameters per robot")
         value_type = get_args(hint)[0] if per_robot else hint
         if value_type not in TYPES:

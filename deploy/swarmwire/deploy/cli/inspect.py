@@ -29,9 +29,14 @@ def list_command(
 
       swarmwire describe kill
     """
-    from swarmwire.deploy.cli.actions.names import list_names
+    from swarmwire.deploy.cli.catalogue.kinds import kind_named, print_kinds, print_list
+    from swarmwire.deploy.terminal.console import TerminalConsole
 
-    list_names(kind)
+    console = TerminalConsole()
+    if kind:
+        print_list(kind_named(kind), console)
+    else:
+        print_kinds(console)
 
 
 def describe_command(
@@ -56,9 +61,10 @@ def describe_command(
 
       swarmwire describe mine.toml
     """
-    from swarmwire.deploy.cli.actions.names import describe_name
+    from swarmwire.deploy.cli.catalogue.kinds import find, print_entry
+    from swarmwire.deploy.terminal.console import TerminalConsole
 
-    describe_name(name)
+    print_entry(find(name), TerminalConsole())
 
 
 def schema_command() -> None:

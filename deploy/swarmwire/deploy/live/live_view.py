@@ -141,7 +141,7 @@ class PageBeside(LiveView):
 
     def _on_closed(self) -> None:
         controls = self._simulation.controls
-        if self._simulation.tick <= 1:  # the page was not used, so nobody will resume the run
+        if self._simulation.tick <= 1:  # the page was not used, so no user will resume the run
             controls.resume()
         elif not self._over:
             state = "paused: swarmwire ctl resume continues it" if controls.paused else "running"
