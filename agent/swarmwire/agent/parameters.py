@@ -104,7 +104,10 @@ class Parameter:
 
 
 def parameters_of(kind: type[Parametrized]) -> dict[str, Parameter]:
-    """Return the parameters of an agent class, those of its bases first; TypeError for a type that no scenario has."""
+    """Return the parameters of an agent class, those of its bases first.
+
+    TypeError for a type that no scenario has, and for a default outside its bounds.
+    """
     parameters: dict[str, Parameter] = {}
     bounds = kind._bounds  # pyright: ignore[reportPrivateUsage] - this module's own class
     for name, hint in get_type_hints(kind).items():
@@ -116,8 +119,12 @@ def parameters_of(kind: type[Parametrized]) -> dict[str, Parameter]:
         value_type = get_args(hint)[0] if per_robot else hint
         if value_type not in TYPES:
             raise TypeError(f"{kind.__name__}.{name}: a parameter is a float, int, bool or str")
-        default = getattr(kind, name, REQUIRED)
-        parameters[name] = Parameter(name, value_type, default, per_robot, bounds.get(name, UNEXPLAINED))
+        parameter = Parameter(name, value_type, getattr(kind, name, REQUIRED), per_robot, bounds.get(name, UNEXPLAINED))
+        if value_type in (float, int) and parameter.default is not REQUIRED:
+            fault = fault_of(parameter.default, parameter.bounds)
+            if fault is not None:
+                raise TypeError(f"{kind.__name__}.{name}: default: {fault}")
+        parameters[name] = parameter
     for name in bounds:
         if name not in parameters:
             raise TypeError(f"{kind.__name__}.{name}: expected its type: {name}: float = parameter(…)")

@@ -244,6 +244,14 @@ def test_parameter_with_bounds_has_its_default_and_help() -> None:
         checked_parameters(Bounded, {})
 
 
+def test_parameter_default_outside_its_bounds_is_refused_also_in_a_subclass() -> None:
+    class TooMuch(Bounded):
+        share: float = 1.5
+
+    with pytest.raises(TypeError, match="share"):
+        parameters_of(TooMuch)
+
+
 def test_parameter_without_a_type_is_refused() -> None:
     untyped = type("Untyped", (Agent,), {"turns": parameter(3, help="number of turns")})
     with pytest.raises(TypeError, match="turns"):
