@@ -21,7 +21,7 @@ from swarmwire.comms.protocols.ros2.links import close, open_client
 from swarmwire.comms.protocols.ros2.messages import DEFINITIONS
 from swarmwire.comms.robot.bodies.body import Body, body_from
 from swarmwire.deploy import Simulation
-from swarmwire.deploy.cli.actions.gateway_options import parse_gateways
+from swarmwire.deploy.cli.actions.run import parse_gateways
 from tests.support.clocks import until
 from tests.support.comms.protocols.ros2 import independent
 from tests.support.comms.protocols.ros2.navigation import ODOM, Pose, combined

@@ -11,7 +11,7 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy import Gateways, Simulation
-from swarmwire.deploy.cli.actions.gateway_options import gateway_network, parse_gateways
+from swarmwire.deploy.cli.actions.run import gateway_network, parse_gateways
 from swarmwire.deploy.robots.certificates.folder import begin_authority, issue, revoke
 from swarmwire.deploy.robots.certificates.register import certificate_request
 from swarmwire.deploy.runs.gateways.gateways import as_gateways

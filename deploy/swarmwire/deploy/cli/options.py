@@ -1,12 +1,14 @@
-"""Arguments and options that several commands share, and the exit codes."""
+"""Arguments and options that several commands share, commands whose options are a dataclass, and the exit codes."""
 
+import inspect
 import select
 import sys
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
@@ -17,6 +19,46 @@ if TYPE_CHECKING:
 
 ACCESS = "Beyond this machine"
 GATEWAYS = "Robots that answer as real ones"
+OptionsT = TypeVar("OptionsT")
+
+
+def with_options(command: Callable[[OptionsT], None]) -> Callable[..., None]:
+    """Return the typer command of a function whose only parameter is a dataclass of arguments and options.
+
+    A field that is itself a dataclass is a group of options, which several commands can share.
+    """
+    kind: type[Any] = next(iter(get_type_hints(command).values()))
+    parameters = list(_parameters(kind))
+
+    @wraps(command)
+    def typer_command(**values: Any) -> None:
+        command(_instance(kind, values))
+
+    signature = inspect.Signature(parameters)
+    typer_command.__signature__ = signature  # pyright: ignore[reportAttributeAccessIssue] - typer reads it
+    typer_command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return typer_command
+
+
+def _parameters(kind: type[Any]) -> Iterator[inspect.Parameter]:
+    """Return a parameter for each option, groups in the order of their fields."""
+    hints = get_type_hints(kind, include_extras=True)
+    for option in fields(kind):
+        hint = hints[option.name]
+        if is_dataclass(hint):
+            yield from _parameters(hint)  # pyright: ignore[reportArgumentType] - a class, not an instance
+        else:
+            default = inspect.Parameter.empty if option.default is MISSING else option.default
+            keyword = inspect.Parameter.KEYWORD_ONLY
+            yield inspect.Parameter(option.name, keyword, default=default, annotation=hint)
+
+
+def _instance(kind: type[OptionsT], values: Mapping[str, Any]) -> OptionsT:
+    hints = get_type_hints(kind)
+    names = [option.name for option in fields(kind)]  # pyright: ignore[reportArgumentType] - a dataclass
+    return kind(
+        **{name: _instance(hints[name], values) if is_dataclass(hints[name]) else values[name] for name in names}
+    )
 
 
 def scenario_file(path: Path | None) -> Path | None:

@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from swarmwire.deploy.cli.grouped import with_options
-from swarmwire.deploy.cli.options import AsJson, Overrides, Seed
+from swarmwire.deploy.cli.options import AsJson, Overrides, Seed, with_options
 
 radio_app = typer.Typer(
     help="Probe an emulated radio without a run, or fit one to logs of real robots.",

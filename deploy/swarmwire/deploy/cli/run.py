@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from swarmwire.deploy.cli.grouped import with_options
+from swarmwire.deploy.cli.options import with_options
 from swarmwire.deploy.cli.run_options import RepeatOptions, RunCommandOptions
 from swarmwire.deploy.machine import need_address_space
 

@@ -7,8 +7,7 @@ from typing import Annotated
 import typer
 
 from swarmwire.comms.base.extras import TUNE
-from swarmwire.deploy.cli.grouped import with_options
-from swarmwire.deploy.cli.options import Overrides, Quiet, scenario_file
+from swarmwire.deploy.cli.options import Overrides, Quiet, scenario_file, with_options
 
 TRIALS, TRIAL_SEEDS, CHECK_SEEDS = 100, "20", "50"
 PARALLEL_TRIALS, SAMPLER_SEED = 4, 1

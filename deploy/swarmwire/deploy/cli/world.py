@@ -6,8 +6,7 @@ from typing import Annotated
 
 import typer
 
-from swarmwire.deploy.cli.grouped import with_options
-from swarmwire.deploy.cli.options import AgentNetwork, Certs, Insecure, Isolate
+from swarmwire.deploy.cli.options import AgentNetwork, Certs, Insecure, Isolate, with_options
 from swarmwire.deploy.cli.run_options import WorldOptions
 from swarmwire.deploy.machine import need_address_space
 

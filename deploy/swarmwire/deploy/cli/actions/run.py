@@ -1,5 +1,6 @@
-"""`swarmwire run`: a run in the terminal, with its views."""
+"""`swarmwire run`: a run in the terminal, with its views, and robots that answer as real ones."""
 
+import tomllib
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, replace
@@ -9,10 +10,12 @@ from typing import Any
 import typer
 from rich.console import Console
 
+from swarmwire.comms.base.config import from_toml
 from swarmwire.comms.base.errors import BadInput, RecordFailed
 from swarmwire.comms.base.extras import UI
 from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.deploy.cli.actions.gateway_options import gateway_network, parse_gateways
+from swarmwire.comms.wire.access_control import TRACKER
+from swarmwire.comms.wire.network import Network, as_options
 from swarmwire.deploy.cli.display.progress import GatewayAddresses, run_progress
 from swarmwire.deploy.cli.display.report import print_result
 from swarmwire.deploy.cli.options import INTERRUPTED, leaving_when_hung_up
@@ -20,8 +23,9 @@ from swarmwire.deploy.cli.run_options import GatewayOptions, OpenViews, PacketOp
 from swarmwire.deploy.live.live_view import LiveView, PageBeside
 from swarmwire.deploy.live.remote_control import Announced
 from swarmwire.deploy.machine import program, report_compiling
+from swarmwire.deploy.robots.certificates.member import member
 from swarmwire.deploy.runs.config import Recording, RunConfig, choose_seeds, packet_share
-from swarmwire.deploy.runs.gateways.gateways import Gateways
+from swarmwire.deploy.runs.gateways.gateways import LOOPBACK, Gateways
 from swarmwire.deploy.runs.interfaces import enter_user_namespace
 from swarmwire.deploy.runs.record.folder import default_folder
 from swarmwire.deploy.runs.result import Result
@@ -69,15 +73,6 @@ def record_settings(recording: PacketOptions) -> Recording:
     return replace(Recording(), **{**asdict(recording), "packets": packet_share(recording.packets)})
 
 
-def _gateways(options: GatewayOptions, scenario: Scenario) -> Gateways | None:
-    robots, revoked = scenario.robot_names(), options.revoked or []
-    for name in revoked:
-        if name not in robots:
-            raise BadInput("--revoked", name, "expected a robot of the scenario")
-    network = gateway_network(options.network, options.certs, revoked, insecure=options.insecure)
-    return parse_gateways(options.gateways or [], options.options or [], options.swarm, network)
-
-
 def show_run(config: RunConfig, console: Console, views: OpenViews, observers: Sequence[Observer] = ()) -> None:
     """Run a scenario into its folder, and print its progress and its summary; the views stay open afterwards."""
     folder = Path(config.out or "")
@@ -123,3 +118,74 @@ def _print_next_steps(result: Result, folder: Path, console: Console) -> None:
     console.print(f"written: {folder}{recorded}", soft_wrap=True)
     console.print(f"look at it: {program()} view {folder}", soft_wrap=True)
     console.print(f"as a film: {program()} export {folder} --to film.gif", soft_wrap=True)
+
+
+def _gateways(options: GatewayOptions, scenario: Scenario) -> Gateways | None:
+    if options == GatewayOptions():
+        return None
+    robots, revoked = scenario.robot_names(), options.revoked or []
+    for name in revoked:
+        if name not in robots:
+            raise BadInput("--revoked", name, "expected a robot of the scenario")
+    network = gateway_network(options.network, options.certs, revoked, insecure=options.insecure)
+    return parse_gateways(options.gateways or [], options.options or [], options.swarm, network)
+
+
+def parse_gateways(
+    gateways: Sequence[str], options: Sequence[str], swarm: str | None, network: Network | None
+) -> Gateways | None:
+    """Parse `--gateway [GROUP=]KIND[@ADDRESS]` and its companion options; None without a gateway.
+
+    BadInput for an invalid form, and for companion options without a gateway.
+    """
+    kinds: dict[str, str] = {}
+    for text in gateways:
+        before, at_sign, address = text.partition("@")
+        group, equals, kind = before.rpartition("=")
+        if not kind or (equals and not group) or (at_sign and not address):
+            raise BadInput("--gateway", text, "expected KIND, KIND@ADDRESS, GROUP=KIND or GROUP=KIND@ADDRESS")
+        if group in kinds:
+            robots = f"the group {group!r}" if group else "all groups"
+            raise BadInput("--gateway", text, f"expected one gateway for {robots}, got a second one")
+        kinds[group] = f"{kind}{at_sign}{address}"
+    if kinds:
+        parsed = Gateways(kinds, dict(_parse_option(text) for text in options))
+        parsed = parsed if swarm is None else replace(parsed, swarm=swarm)
+        return parsed if network is None else replace(parsed, network=network)
+    network_flag = "--network"
+    if network is not None and (network.proves or network.insecure):
+        network_flag = "--certs" if network.proves else "--insecure"
+    for flag, value in (("--gateway-set", bool(options)), ("--swarm", swarm), (network_flag, network)):
+        if value:
+            raise BadInput(flag, "", "expected --gateway with it: no robot of this run answers as a real one")
+    return None
+
+
+def gateway_network(
+    endpoint: str | None, certs: Path | None, revoked: Sequence[str] = (), *, insecure: bool
+) -> Network | None:
+    """Return the network of `--network` and its companion options; None without these. BadInput if it is not safe.
+
+    The run is the tracker of its robots' network, and has its name.
+    """
+    name = None if certs is None else TRACKER
+    credentials = member(TRACKER, certs=certs, name=name, revoked=revoked, insecure=insecure).network
+    if endpoint is None and credentials == Network():
+        return None
+    network = replace(credentials, listen=LOOPBACK.listen if endpoint is None else (endpoint,))
+    try:
+        network.check("")
+    except BadInput as error:
+        raise BadInput("--network", "", as_options(error.expected)) from None
+    return network
+
+
+def _parse_option(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip():
+        raise BadInput("--gateway-set", text, "expected OPTION=VALUE or GROUP.OPTION=VALUE")
+    try:
+        table = from_toml(f"value = {value}")
+    except tomllib.TOMLDecodeError:
+        return name.strip(), value.strip()
+    return name.strip(), table["value"] if len(table) == 1 else value
