@@ -10,21 +10,13 @@ import sys
 import tempfile
 import threading
 from _thread import LockType, allocate_lock, start_new_thread
-from collections.abc import Generator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from swarmwire.comms.base.errors import BadInput
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
 KERNEL_CACHE = "NUMBA_CACHE_DIR"
 CODE = Path(__file__).parent
-COMPILING_S = 2.0  # time of compiling before a line reports it
-COMPILING_INTERVAL_S = 10.0  # time from one line to the next
-COMPILING = "compiling kernels that this machine does not have yet: for a minute or so, then they are kept"
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8  # parameters of mallopt, from glibc's malloc.h
 MAX_CACHED_ARRAY_BYTES = 2**25  # glibc's maximum on 64 bits; larger arrays return to the system at once
@@ -67,58 +59,6 @@ def keep_kernels() -> None:
     except (OSError, RuntimeError):  # RuntimeError: there is no home
         os.environ[KERNEL_CACHE] = tempfile.mkdtemp(prefix="sw-kernels-")  # inherited by child processes
         atexit.register(shutil.rmtree, os.environ[KERNEL_CACHE], ignore_errors=True)
-
-
-@contextmanager
-def report_compiling(
-    console: "Console", after_s: float = COMPILING_S, interval_s: float = COMPILING_INTERVAL_S
-) -> Generator[None]:
-    """Print a line once kernels have compiled for `after_s` within the context, then their number each `interval_s`."""
-    from swarmwire.comms.base.clock import WallClock, to_s
-    from swarmwire.comms.base.kernels import compile_events
-
-    class Compiling:
-        is_compiling = False
-        kernels = 0
-        remaining_s = after_s  # time of compiling before the next line
-        has_printed = False
-
-        def on_start(self, depth: int) -> None:
-            with lock:
-                self.kernels += 1
-                if depth == 0:
-                    self.is_compiling = True
-                    self.wait()
-
-        def on_end(self, depth: int) -> None:
-            with lock:
-                if depth == 0:
-                    self.is_compiling = False
-                    self.timer.cancel()
-                    self.remaining_s -= to_s(clock.now_ns() - self.start_ns)
-                    if self.remaining_s <= 0:
-                        self.print_line()
-
-        def wait(self) -> None:
-            self.start_ns, self.timer = clock.now_ns(), threading.Timer(self.remaining_s, self.print_meanwhile)
-            self.timer.daemon = True
-            self.timer.start()
-
-        def print_meanwhile(self) -> None:
-            with lock:
-                if self.is_compiling and self.timer is threading.current_thread():
-                    self.print_line()
-                    self.wait()
-
-        def print_line(self) -> None:
-            console.print(
-                f"{self.kernels} kernels so far" if self.has_printed else COMPILING, soft_wrap=True, highlight=False
-            )
-            self.has_printed, self.remaining_s = True, interval_s
-
-    clock, lock, compiling = WallClock(), threading.Lock(), Compiling()
-    with compile_events(compiling.on_start, compiling.on_end):
-        yield
 
 
 def share_heaps() -> None:

@@ -165,8 +165,7 @@ def list_issued_command(folder: AuthorityFolder, as_json: AsJson = False) -> Non
 
 def _print_issued(states: "Sequence[tuple[Issued, str]]") -> None:
     from swarmwire.deploy.robots.certificates.register import text_of
-    from swarmwire.deploy.terminal.console import TerminalConsole
-    from swarmwire.deploy.terminal.tables import print_rows
+    from swarmwire.deploy.terminal.console import TerminalConsole, print_rows
 
     rows = [
         (

@@ -246,8 +246,7 @@ def status_command(file: FleetFile, robots: OfRobots = None, groups: OfGroups = 
 def _print_status(robots: "Sequence[RobotStatus]") -> None:
     """Print a table of the robots that answered, and below it, as wide as the terminal, the faults of others."""
     from swarmwire.deploy.robots.result import RobotResult, result_lines
-    from swarmwire.deploy.terminal.console import TerminalConsole
-    from swarmwire.deploy.terminal.tables import print_rows
+    from swarmwire.deploy.terminal.console import TerminalConsole, print_rows
 
     rows = [_row(status) for status in robots if not status.fault]
     if rows:

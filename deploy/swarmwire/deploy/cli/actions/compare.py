@@ -6,9 +6,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from swarmwire.deploy.terminal.console import TerminalConsole
+from swarmwire.deploy.terminal.console import TerminalConsole, print_rows
 from swarmwire.deploy.terminal.output import echo
-from swarmwire.deploy.terminal.tables import print_rows
 from swarmwire.metrics.records.campaign.compare import (
     COLUMNS,
     CampaignComparison,

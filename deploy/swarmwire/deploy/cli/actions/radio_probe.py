@@ -9,7 +9,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.deploy.cli.actions.radio_coverage import CoverageProbe, coverage_json, print_coverage, probe_coverage
 from swarmwire.deploy.cli.radio import ProbeOptions
-from swarmwire.deploy.machine import report_compiling
+from swarmwire.deploy.runs.compiling import report_compiling
 from swarmwire.deploy.runs.scenario_parts import radio_of
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.deploy.terminal.output import echo

@@ -8,7 +8,7 @@ from swarmwire.deploy.cli.actions.run import record_settings
 from swarmwire.deploy.cli.display.progress import run_progress
 from swarmwire.deploy.cli.options import DIFFERENT, INTERRUPTED, leaving_when_hung_up
 from swarmwire.deploy.cli.run_options import RepeatOptions
-from swarmwire.deploy.machine import report_compiling
+from swarmwire.deploy.runs.compiling import report_compiling
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.metrics.records.campaign.campaign_json import CAMPAIGN_FILE
 

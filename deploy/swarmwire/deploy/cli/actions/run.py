@@ -22,8 +22,9 @@ from swarmwire.deploy.cli.options import INTERRUPTED, leaving_when_hung_up
 from swarmwire.deploy.cli.run_options import GatewayOptions, OpenViews, PacketOptions, RunCommandOptions, StartOptions
 from swarmwire.deploy.live.live_view import LiveView, PageBeside
 from swarmwire.deploy.live.remote_control import Announced
-from swarmwire.deploy.machine import program, report_compiling
+from swarmwire.deploy.machine import program
 from swarmwire.deploy.robots.certificates.member import member
+from swarmwire.deploy.runs.compiling import report_compiling
 from swarmwire.deploy.runs.config import Recording, RunConfig, choose_seeds, packet_share
 from swarmwire.deploy.runs.gateways.gateways import LOOPBACK, Gateways
 from swarmwire.deploy.runs.interfaces import enter_user_namespace

@@ -18,9 +18,8 @@ from swarmwire.comms.base.plugins import file_of, with_file
 from swarmwire.comms.observe.truth import Static
 from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.runs.scenario_parts import agent_specs, selected_metrics
-from swarmwire.deploy.terminal.console import TerminalConsole
+from swarmwire.deploy.terminal.console import TerminalConsole, print_rows
 from swarmwire.deploy.terminal.output import echo
-from swarmwire.deploy.terminal.tables import print_rows
 from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.real.real_log.real_logs import RealLogs, read_real_logs
 from swarmwire.metrics.real.real_log.robot_log import RealRobotLog

@@ -8,9 +8,8 @@ from swarmwire.deploy.cli.actions.control import control_of
 from swarmwire.deploy.cli.options import RunChoice
 from swarmwire.deploy.live.following import RunGone
 from swarmwire.deploy.live.remote_control import controlling, find_run, found_runs
-from swarmwire.deploy.terminal.console import TerminalConsole
+from swarmwire.deploy.terminal.console import TerminalConsole, aligned, print_rows
 from swarmwire.deploy.terminal.output import echo
-from swarmwire.deploy.terminal.tables import aligned, print_rows
 
 COLUMNS = ("run", "pid", "scenario", "tick", "state", "speed", "alive", "folder")
 

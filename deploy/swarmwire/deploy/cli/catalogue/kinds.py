@@ -29,7 +29,7 @@ from swarmwire.deploy.cli.catalogue.scenario import (
     radio_stages,
 )
 from swarmwire.deploy.cli.catalogue.schema import CatalogueEntry, CatalogueParameter, ParameterTable
-from swarmwire.deploy.terminal.tables import aligned
+from swarmwire.deploy.terminal.console import aligned
 from swarmwire.world.scenario.bodies import sheet_path
 
 

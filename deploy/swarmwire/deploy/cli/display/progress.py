@@ -21,7 +21,7 @@ from swarmwire.deploy.cli.display.panel import Panel
 from swarmwire.deploy.runs.config import JoinObserver
 from swarmwire.deploy.runs.gateways.serving import ServedRobot
 from swarmwire.deploy.runs.simulation import Simulation
-from swarmwire.deploy.terminal.tables import aligned
+from swarmwire.deploy.terminal.console import aligned
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.world.backends.runner_reports import RunnerEvent
 
