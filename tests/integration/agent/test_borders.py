@@ -21,7 +21,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, run
-from swarmwire.deploy.live.remote_control import Announced, runs_folder
+from swarmwire.deploy.runs.live_address import Announcement, runs_folder
 from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from tests.support.agent import hostile
 from tests.support.clocks import until
@@ -93,7 +93,7 @@ radio = {{ preset = "unit-disk" }}
     file.write_text("\n".join([head, group("honest", "Honest"), group("prey", "Honest"), *hostile_groups]))
     seen = Seen()
     simulation = Simulation(file, runners="per-robot", out=folder / "run", observers=[seen], **options)
-    simulation.watch(Announced(folder / "run"))
+    simulation.watch(Announcement(folder / "run"))
     result = run_to_end(simulation)
     lost = dict(text.partition(", which played ")[2].split(": ", 1) for text in result.lost_runners)
     by_attack = {attack: lost.pop(f"h{at}-0") for at, attack in enumerate(attacks) if f"h{at}-0" in lost}

@@ -11,7 +11,8 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.wire.assignment import split
 from swarmwire.deploy import Recording, Result, repeat, run
-from swarmwire.deploy.runs.runners import RunnerProcesses, local_endpoint, new_run_id
+from swarmwire.deploy.runs.live_address import local_endpoint, new_run_id
+from swarmwire.deploy.runs.runners import RunnerProcesses
 from swarmwire.deploy.runs.scenario_parts import agent_specs, new_medium
 from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.metrics.measures.measure import Metrics

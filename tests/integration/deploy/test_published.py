@@ -19,7 +19,7 @@ from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpo
 from swarmwire.deploy import run
 from swarmwire.deploy.live.following import RunGone, following
 from swarmwire.deploy.runs import backends, published
-from swarmwire.deploy.runs.live_address import Live, read_live
+from swarmwire.deploy.runs.live_address import Live, read_live, write_live
 from swarmwire.deploy.runs.published import Published
 from swarmwire.metrics.measures.measure import Metrics
 from tests.support.clocks import StillClock, until
@@ -239,9 +239,9 @@ def test_published_run_listens_on_no_network(tmp_path):
 
 
 def test_live_file_of_a_killed_run_is_not_believed(tmp_path):
-    Live("unixsock-stream//nowhere", "r", 2**22 + 1).write(tmp_path)  # more than Linux gives out
+    write_live(Live("unixsock-stream//nowhere", "r", 2**22 + 1), tmp_path)  # more than Linux gives out
     assert read_live(tmp_path) is None
-    Live(f"unixsock-stream/{tmp_path}/none", "r", os.getpid()).write(tmp_path)
+    write_live(Live(f"unixsock-stream/{tmp_path}/none", "r", os.getpid()), tmp_path)
     with pytest.raises(RunGone, match="cannot be reached"), following(read_live(tmp_path)):
         pass
 

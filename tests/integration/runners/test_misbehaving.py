@@ -16,9 +16,9 @@ from swarmwire.agent.runner import Arrivals, ProcessPool
 from swarmwire.comms.base.errors import AgentFailed, BadInput, Interrupted, RunnerLost
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
-from swarmwire.deploy.live.remote_control import Announced, RemoteControl, controlling, found_runs
+from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.runs.config import Listening, Recording
-from swarmwire.deploy.runs.live_address import read_live
+from swarmwire.deploy.runs.live_address import Announcement, live_runs, read_live
 from swarmwire.deploy.runs.result import Result
 from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from tests.support.agent.processes import thread_server
@@ -155,7 +155,7 @@ def listening(
         listening=Listening(HERE, observer=joiners),
         record=Recording(rrd=False, tables=False),
     )
-    simulation.watch(Announced(folder))
+    simulation.watch(Announcement(folder))
     errors: list[str] = []
 
     def run() -> None:
@@ -183,7 +183,7 @@ def waits(control: RemoteControl) -> str:
 
 def test_run_that_waits_for_its_first_runner_can_be_controlled(tmp_path, joiners):
     with listening(tmp_path / "run", joiners) as (simulation, control, errors):
-        until(lambda: simulation.run_id in [run.run for run in found_runs()])
+        until(lambda: simulation.run_id in [run.run for run in live_runs()])
         assert waits(control) == "the runner that plays flock-0 … flock-19 (20 robots)"
         control.step(2)
         control.event({"do": "kill", "robots": {"names": ["flock-3"]}})
@@ -196,7 +196,7 @@ def test_run_that_waits_for_its_first_runner_can_be_controlled(tmp_path, joiners
         until(lambda: errors)
     assert errors == ["interrupted while it waited for its runners"]
     assert read_live(tmp_path / "other") is None
-    assert simulation.run_id not in [run.run for run in found_runs()]
+    assert simulation.run_id not in [run.run for run in live_runs()]
 
 
 def test_run_names_the_frozen_or_lost_runner_that_it_waits_for(tmp_path, joiners):

@@ -22,7 +22,7 @@ from swarmwire.deploy import machine as host
 from swarmwire.deploy.cli import app as cli
 from swarmwire.deploy.machine import KERNEL_CACHE, keep_kernels, program, refusal
 from swarmwire.deploy.runs.compiling import COMPILING, report_compiling
-from swarmwire.deploy.runs.runners import SOCKET, STALE_S, local_endpoint
+from swarmwire.deploy.runs.live_address import SOCKET, STALE_S, local_endpoint
 from tests.support.deploy.runs import called
 
 

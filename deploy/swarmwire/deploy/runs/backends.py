@@ -22,8 +22,9 @@ from swarmwire.comms.wire.assignment import Assignment, robots_text
 from swarmwire.comms.wire.join import GroupInfo, SessionInfo
 from swarmwire.deploy.runs.config import Listening
 from swarmwire.deploy.runs.gateways.serving import Served
+from swarmwire.deploy.runs.live_address import local_endpoint
 from swarmwire.deploy.runs.plan import Plan
-from swarmwire.deploy.runs.runners import AGENT_HOST, RunnerProcesses, local_endpoint
+from swarmwire.deploy.runs.runners import AGENT_HOST, RunnerProcesses
 from swarmwire.world.backends.allocation import full_assignment
 from swarmwire.world.backends.join_policy import JoinPolicy, ListenSettings
 from swarmwire.world.backends.lockstep import Lockstep

@@ -37,8 +37,7 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.observer_frames import encode_scene, encode_truth
 from swarmwire.comms.wire.sessions import closed_after, open_observed
-from swarmwire.deploy.runs.live_address import Live, remove_live_address
-from swarmwire.deploy.runs.runners import local_endpoint
+from swarmwire.deploy.runs.live_address import Live, local_endpoint, remove_live, write_live
 from swarmwire.metrics.measures.measure import MetricValues
 from swarmwire.metrics.pictures.viewer.selection import ARENA, living_robot, selected_robot
 from swarmwire.world.backends.join_policy import ListenSettings
@@ -201,8 +200,8 @@ class Published(Observer):
             resources.callback(self._endpoint.close)
             address, session = self._endpoint.open()
             self._declare(session, encode_scene(self._scene(static)))
-            resources.callback(remove_live_address, self._folder)
-            Live(address, self._run_id, os.getpid()).write(self._folder)
+            resources.callback(remove_live, self._folder)
+            write_live(Live(address, self._run_id, os.getpid()), self._folder)
             self._sender = threading.Thread(target=self._send_all, name="published", daemon=True)
             self._sender.start()
             resources.callback(self._stop_sender)

@@ -1,66 +1,18 @@
-"""The agent host of a run on this machine: its endpoint and its process."""
+"""The agent host of a run on this machine: its process, and the check of its isolation."""
 
 import os
-import secrets
-import shutil
 import signal
-import socket
 import subprocess
 import sys
-import tempfile
-from collections.abc import Generator, Sequence
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from collections.abc import Sequence
+from contextlib import suppress
 
 from swarmwire.agent.isolation import DEFAULT_ISOLATION, Isolation
-from swarmwire.comms.base.clock import WallClock, to_ns
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.wire.sessions import PRIVATE, unix_endpoint
 
-STALE_S = 60.0  # age of a socket without a listener; the run of a younger one may be about to listen
-ANSWER_TIMEOUT_S = 0.5
-SOCKET = "world"  # name of the socket in its private directory
 STOP_TIMEOUT_S = 3.0
 FORK_SERVER = "swarmwire.agent.fork_server"  # program that tries an isolation
 AGENT_HOST = "swarmwire.agent.agent_host"  # program of the agent host
-
-
-def new_run_id() -> str:
-    """Return a unique name for one execution."""
-    return secrets.token_hex(4)
-
-
-@contextmanager
-def local_endpoint() -> Generator[str]:
-    """Return an endpoint in a new private directory, which is removed after the context."""
-    base = tempfile.gettempdir()
-    base = base if len(base) < 60 else "/tmp"
-    _remove_stale(Path(base))
-    with tempfile.TemporaryDirectory(prefix=PRIVATE, dir=base) as directory:
-        yield unix_endpoint(f"{directory}/{SOCKET}")
-
-
-def _remove_stale(base: Path) -> None:
-    """Remove the directories of this user's runs that were killed."""
-    before_ns = WallClock().utc_ns() - to_ns(STALE_S)
-    for path in base.glob(f"{PRIVATE}*/{SOCKET}"):
-        with suppress(OSError):  # another user's, or removed by now
-            status = path.lstat()
-            is_old = path.is_socket() and status.st_uid == os.getuid() and status.st_mtime_ns < before_ns
-            if is_old and not _has_listener(path):
-                shutil.rmtree(path.parent)
-
-
-def _has_listener(path: Path) -> bool:
-    with socket.socket(socket.AF_UNIX) as probe:
-        probe.settimeout(ANSWER_TIMEOUT_S)
-        try:
-            probe.connect(str(path))
-        except ConnectionRefusedError:
-            return False
-        except (TimeoutError, BlockingIOError):  # the listener is frozen, and its queue is full
-            return True
-        return True
 
 
 def check_isolation(isolation: Isolation) -> None:

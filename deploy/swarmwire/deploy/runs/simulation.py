@@ -31,6 +31,7 @@ from swarmwire.deploy.runs.control_server import ControlServer, Status
 from swarmwire.deploy.runs.controls import Controls, Interrupt
 from swarmwire.deploy.runs.gateways.serving import RunGateways, Served, Undriven
 from swarmwire.deploy.runs.interfaces import InterfacesLog, OpenInterfaces
+from swarmwire.deploy.runs.live_address import new_run_id
 from swarmwire.deploy.runs.observers import (
     EmptyBatteries,
     MemoryReturn,
@@ -47,7 +48,7 @@ from swarmwire.deploy.runs.record.inputs import ReplayedBackend
 from swarmwire.deploy.runs.record.provenance import RunFacts
 from swarmwire.deploy.runs.record.replay_logs import TrajectoryLog
 from swarmwire.deploy.runs.result import Outcome, Result, result_of
-from swarmwire.deploy.runs.runners import check_isolation, new_run_id
+from swarmwire.deploy.runs.runners import check_isolation
 from swarmwire.metrics.measures.measure import MeasuredStopConditions, Metrics
 from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.pictures.viewer.recording import RerunRecording

@@ -11,9 +11,18 @@ from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy import repeat, run
 from swarmwire.deploy.cli.actions.inject import robot_selection
 from swarmwire.deploy.cli.app import app
-from swarmwire.deploy.live import remote_control
-from swarmwire.deploy.live.remote_control import Announced, FoundRun, Refused, find_run, found_runs, runs_folder
-from swarmwire.deploy.runs.live_address import Live, read_live
+from swarmwire.deploy.live.remote_control import Refused
+from swarmwire.deploy.runs import live_address
+from swarmwire.deploy.runs.live_address import (
+    Announcement,
+    Live,
+    LiveRun,
+    find_run,
+    live_runs,
+    read_live,
+    runs_folder,
+    write_live,
+)
 from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from tests.support.clocks import until
 from tests.support.deploy.runs import LOSSY, at_tick, going
@@ -32,31 +41,31 @@ def runtime(tmp_path, monkeypatch):
 def announced(folder, run, pid=None):
     """A run that is announced, as far as files go."""
     folder.mkdir()
-    Live("unixsock-stream//nowhere", run, pid or os.getpid()).write(folder)
-    found = Announced(folder)
+    write_live(Live("unixsock-stream//nowhere", run, pid or os.getpid()), folder)
+    found = Announcement(folder)
     found.begin(static(2))
     return found
 
 
 def test_run_is_found_until_it_ends(tmp_path, runtime):
-    assert found_runs() == []
+    assert live_runs() == []
     run = announced(tmp_path / "a", "r1")
-    [found] = found_runs()
-    assert found == FoundRun("r1", "unixsock-stream//nowhere", os.getpid(), static(2).name, str(tmp_path / "a"))
+    [found] = live_runs()
+    assert found == LiveRun("unixsock-stream//nowhere", "r1", os.getpid(), static(2).name, str(tmp_path / "a"))
     assert find_run(None) == find_run("r1") == find_run("r") == found
     assert find_run(str(tmp_path / "a")).run == "r1"
     assert run.end(None) == {}
-    assert found_runs() == []
+    assert live_runs() == []
     assert list(runtime.iterdir()) == []
 
 
 def test_killed_runs_and_files_that_are_no_run_are_removed(tmp_path, runtime):
     folder = runs_folder()
-    killed = FoundRun("r1", "e", NOBODY, "s", "f")
+    killed = LiveRun("e", "r1", NOBODY, "s", "f")
     (folder / "r1.json").write_text(json.dumps(vars(killed)))
     (folder / "r2.json").write_text("[]")
     (folder / ".aside-r3.json").write_text("")
-    assert found_runs() == []
+    assert live_runs() == []
     assert [path.name for path in runtime.iterdir()] == [".aside-r3.json"]
 
 
@@ -98,7 +107,7 @@ def test_without_a_runtime_folder_it_is_one_among_the_temporary_files(tmp_path, 
 def test_runtime_folder_of_another_user_is_passed_over(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid + 1)
-    assert remote_control._belongs_to_user(tmp_path) is False
+    assert live_address._belongs_to_user(tmp_path) is False
     with pytest.raises(BadInput, match=f"swarmwire-{os.getuid()}"):  # which is of another user here, too
         runs_folder()
 
@@ -273,7 +282,7 @@ def test_faults_are_told_in_one_line(going_run, arguments, place):
 @pytest.fixture
 def going_run(tmp_path):
     """A run of this process that is announced as those of the command line are."""
-    with going(tmp_path / "run", "duration_s=1", observers=[Announced(tmp_path / "run")]) as found:
+    with going(tmp_path / "run", "duration_s=1", observers=[Announcement(tmp_path / "run")]) as found:
         until(lambda: list((tmp_path / "swarmwire").glob("*.json")))
         yield found
 

@@ -8,8 +8,9 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.wire.access_control import OPERATOR
 from swarmwire.comms.wire.network import Network
 from swarmwire.deploy.cli.options import RunChoice
-from swarmwire.deploy.live.remote_control import RemoteControl, controlling, find_run, only_run_at
+from swarmwire.deploy.live.remote_control import RemoteControl, controlling, only_run_at
 from swarmwire.deploy.robots.certificates.member import member
+from swarmwire.deploy.runs.live_address import find_run
 from swarmwire.deploy.terminal.output import echo
 
 UNLIMITED = "max"

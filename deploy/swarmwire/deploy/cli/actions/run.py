@@ -21,13 +21,13 @@ from swarmwire.deploy.cli.display.report import print_result
 from swarmwire.deploy.cli.options import INTERRUPTED, leaving_when_hung_up
 from swarmwire.deploy.cli.run_options import GatewayOptions, OpenViews, PacketOptions, RunCommandOptions, StartOptions
 from swarmwire.deploy.live.live_view import LiveView, PageBeside
-from swarmwire.deploy.live.remote_control import Announced
 from swarmwire.deploy.machine import program
 from swarmwire.deploy.robots.certificates.member import member
 from swarmwire.deploy.runs.compiling import report_compiling
 from swarmwire.deploy.runs.config import Recording, RunConfig, choose_seeds, packet_share
 from swarmwire.deploy.runs.gateways.gateways import LOOPBACK, Gateways
 from swarmwire.deploy.runs.interfaces import enter_user_namespace
+from swarmwire.deploy.runs.live_address import Announcement
 from swarmwire.deploy.runs.record.folder import default_folder
 from swarmwire.deploy.runs.result import Result
 from swarmwire.deploy.runs.simulation import Simulation, run_to_end
@@ -87,7 +87,7 @@ def show_run(config: RunConfig, console: Console, views: OpenViews, observers: S
                 open_views["view"] = stack.enter_context(LiveView(folder))
             if views.ui:
                 open_views["page"] = stack.enter_context(PageBeside(simulation, folder, console))
-            progress = [Announced(folder), GatewayAddresses(simulation, console), run_progress(simulation, console)]
+            progress = [Announcement(folder), GatewayAddresses(simulation, console), run_progress(simulation, console)]
             for observer in (*observers, *progress, *open_views.values()):
                 simulation.watch(observer)
             result = _finish(simulation, console)

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 from swarmwire.deploy.cli.actions.control import control_of
 from swarmwire.deploy.cli.options import RunChoice
 from swarmwire.deploy.live.following import RunGone
-from swarmwire.deploy.live.remote_control import controlling, find_run, found_runs
+from swarmwire.deploy.live.remote_control import controlling
+from swarmwire.deploy.runs.live_address import find_run, live_runs
 from swarmwire.deploy.terminal.console import TerminalConsole, aligned, print_rows
 from swarmwire.deploy.terminal.output import echo
 
@@ -41,7 +42,7 @@ def _statuses(choice: RunChoice) -> list[RunStatus]:
         with control_of(choice) as control:
             return [RunStatus(control.status(), None)]
     statuses: list[RunStatus] = []
-    for run in found_runs() if choice.run is None else [find_run(choice.run)]:
+    for run in live_runs() if choice.run is None else [find_run(choice.run)]:
         with ExitStack() as stack:
             if choice.run is None:
                 stack.enter_context(suppress(RunGone))
