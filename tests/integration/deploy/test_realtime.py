@@ -13,7 +13,7 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run
-from swarmwire.deploy.runs import simulation as simulation_module
+from swarmwire.deploy.runs import phases
 from swarmwire.deploy.runs.gateways.serving import RunGateways
 from swarmwire.deploy.runs.real_time import warm_up
 from swarmwire.deploy.runs.record.inputs import LENGTH_BYTES, WITHIN
@@ -178,9 +178,7 @@ def test_rehearsal_receives_packets_within_ticks_if_the_run_has_subticks(subtick
 
 def test_rehearsal_of_a_gateway_run_comes_before_any_gateway_answers(monkeypatch) -> None:
     said = list[str]()
-    monkeypatch.setattr(
-        simulation_module, "warm_up", lambda world, *_, **__: said.append(f"rehearsed {world.static.robots}")
-    )
+    monkeypatch.setattr(phases, "warm_up", lambda world, *_, **__: said.append(f"rehearsed {world.static.robots}"))
     simulation = Simulation(FLOCKING, gateways="epuck2", realtime=100.0)
     serve = RunGateways.serve
     monkeypatch.setattr(RunGateways, "serve", lambda *given, **by: (said.append("served"), serve(*given, **by))[1])
@@ -191,7 +189,7 @@ def test_rehearsal_of_a_gateway_run_comes_before_any_gateway_answers(monkeypatch
 
 def test_rehearsal_comes_before_every_real_time_run_and_changes_nothing(monkeypatch) -> None:
     rehearsed = list[int]()
-    monkeypatch.setattr(simulation_module, "warm_up", lambda *given, **by: (rehearsed.append(1), warm_up(*given, **by)))
+    monkeypatch.setattr(phases, "warm_up", lambda *given, **by: (rehearsed.append(1), warm_up(*given, **by)))
     results = list[list[str]]()
     for factor in (None, 1000.0):
         with Simulation(FLOCKING, realtime=factor) as simulation:
@@ -202,7 +200,7 @@ def test_rehearsal_comes_before_every_real_time_run_and_changes_nothing(monkeypa
 
 
 def test_runs_that_keep_to_no_clock_are_not_rehearsed(monkeypatch) -> None:
-    monkeypatch.setattr(simulation_module, "warm_up", None)
+    monkeypatch.setattr(phases, "warm_up", None)
     with Simulation(FLOCKING) as simulation:
         simulation.run(1)
     assert simulation.result.ticks == 1

@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from swarmwire.comms.base.clock import tick_start_ns, to_s
 from swarmwire.comms.observe.truth import Static
 from swarmwire.deploy.runs.backends import real_time_report
+from swarmwire.deploy.runs.phases import Run
 from swarmwire.deploy.runs.plan import Plan
 from swarmwire.deploy.runs.record.folder import RunWriter
 from swarmwire.deploy.runs.record.inputs import InputsRecord
@@ -20,9 +21,6 @@ from swarmwire.world.backends.runner_reports import RunnerEvent
 from swarmwire.world.interfaces.backend import InterfacesReport
 from swarmwire.world.loop import Loop
 from swarmwire.world.world import World
-
-if TYPE_CHECKING:
-    from swarmwire.deploy.runs.simulation import Run
 
 NO_STOP = {"stop_time_s": None, "stopped_by": None}
 
@@ -200,7 +198,7 @@ class Outcome:
 
 
 def result_of(
-    run: "Run", plan: Plan, world: World, writer: RunWriter, entries: Mapping[str, Any], outcome: Outcome
+    run: Run, plan: Plan, world: World, writer: RunWriter, entries: Mapping[str, Any], outcome: Outcome
 ) -> Result:
     """Return the result of a run that is over; `entries` are the observers' entries of the summary."""
     static, loop, facts, realtime = plan.static, run.loop, run.facts, real_time_report(run.backend)

@@ -1,68 +1,29 @@
 """One execution of a scenario, tick by tick or to its end.
 
-A run has three phases, each with its type: a `Plan` is checked, a `Simulation` has its folder and controls, and a `Run`
-has its agents and observers.
+A run has three phases, each with its type: a `Plan` is checked, a `PreparedRun` has its folder and controls, and a
+`Run` has its agents and observers.
 """
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
-from dataclasses import dataclass
+from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, Unpack, cast
+from typing import Any, Self, Unpack
 
-from swarmwire.comms.base.clock import PreciseClock, WallClock, to_ns
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import Interrupted, RecordFailed
-from swarmwire.comms.base.ethernet import FRAME_TAG
-from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
+from swarmwire.comms.observe.interfaces import Observer, StopConditions
 from swarmwire.comms.observe.truth import Truth
-from swarmwire.comms.robot.messages import DICT_TAG, message_classes
-from swarmwire.deploy.machine import keep_memory, need_address_space, need_open_files, need_threads
-from swarmwire.deploy.runs.backends import (
-    BackendSettings,
-    RunnerLog,
-    open_backend,
-    runner_health,
-)
-from swarmwire.deploy.runs.compiling import CompileTime
+from swarmwire.deploy.machine import keep_memory
+from swarmwire.deploy.runs.backends import runner_health
 from swarmwire.deploy.runs.config import RunConfig, RunOptions, check_options
-from swarmwire.deploy.runs.control_server import ControlServer, Status
-from swarmwire.deploy.runs.controls import Controls, Interrupt
-from swarmwire.deploy.runs.gateways.serving import RunGateways, Served, Undriven
-from swarmwire.deploy.runs.interfaces import InterfacesLog, OpenInterfaces
-from swarmwire.deploy.runs.live_address import new_run_id
-from swarmwire.deploy.runs.observers import (
-    EmptyBatteries,
-    MemoryReturn,
-    ObserverStage,
-    RunObservers,
-    StagedObserver,
-    TooLarge,
-)
-from swarmwire.deploy.runs.plan import make_plan
-from swarmwire.deploy.runs.published import ObserverEndpoint, Published
-from swarmwire.deploy.runs.real_time import raised_priority, warm_up
-from swarmwire.deploy.runs.record.folder import RunWriter
-from swarmwire.deploy.runs.record.inputs import ReplayedBackend
-from swarmwire.deploy.runs.record.provenance import RunFacts
-from swarmwire.deploy.runs.record.replay_logs import TrajectoryLog
+from swarmwire.deploy.runs.control_server import Status
+from swarmwire.deploy.runs.gateways.serving import Served
+from swarmwire.deploy.runs.phases import Run, prepare
 from swarmwire.deploy.runs.result import Outcome, Result, result_of
-from swarmwire.deploy.runs.runners import check_isolation
-from swarmwire.metrics.measures.measure import MeasuredStopConditions, Metrics
-from swarmwire.metrics.measures.network.latency import RadioTally
-from swarmwire.metrics.pictures.viewer.recording import RerunRecording
-from swarmwire.metrics.records.run_folder.events import EventLog
-from swarmwire.metrics.records.run_folder.layout import RECORDING
-from swarmwire.metrics.records.run_folder.table import RecordOptions
-from swarmwire.metrics.records.run_folder.tables import recorders
-from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.runner_reports import RunnerHealth
-from swarmwire.world.interfaces.backend import InterfacesBackend
-from swarmwire.world.live_events import LiveEvents
-from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.scenario import Scenario
-from swarmwire.world.subtick import Subticks
 
 OUTSIDE = "a simulation is stepped within its `with` block"
 
@@ -79,19 +40,6 @@ def run(scenario: RunConfig | Scenario | Path | str, **options: Unpack[RunOption
     result, `observer_failed_…`.
     """
     return run_to_end(Simulation(scenario, **options))
-
-
-@dataclass(frozen=True)
-class Run:
-    """An open run: its loop, with the agents of all robots and the observers of each tick."""
-
-    loop: Loop
-    backend: AgentBackend
-    observers: RunObservers
-    status: Status
-    served: Served | None  # robots that answer as real ones
-    facts: RunFacts
-    log: RunnerLog
 
 
 class Simulation:
@@ -122,28 +70,15 @@ class Simulation:
         check_options("run and Simulation", options, RunConfig)
         if isinstance(scenario, RunConfig) and options:
             raise TypeError(f"run and Simulation: expected {next(iter(options))} as a field of the RunConfig")
-        self._clock = WallClock()
-        self._called_ns = self._start_ns = self._clock.now_ns()  # the start moves to the first tick
-        self.plan, self.world = make_plan(
-            scenario if isinstance(scenario, RunConfig) else RunConfig(scenario, **options)
-        )
-        self._check_machine()
-        plan, static = self.plan, self.plan.static
-        self._writer = RunWriter(plan.out, self._clock)
-        clock = PreciseClock(self._clock) if plan.subtick_s else self._clock
-        self._pace = None if plan.factor is None else Pace(clock, static.rate_hz, plan.factor, self._writer.report)
-        self.metrics = Metrics(plan.metrics)
-        self._measured_stop = (
-            MeasuredStopConditions(self.metrics, plan.stop_conditions) if plan.stop_conditions else None
-        )
-        self.stop_conditions: StopConditions | None = self._measured_stop
-        self.run_id, self.interrupt = new_run_id(), Interrupt()
-        self.controls = Controls(self._clock, static.rate_hz, self._pace, speed_fixed=plan.gateways is not None)
-        bodies = {group.name: group.body for group in static.groups}
-        replayed = plan.config.replay.live_events if plan.config.replay else None
-        self.live_events = LiveEvents(plan.scenario, bodies, self._writer.keep, replayed)
-        self._compiling = CompileTime(self._clock)
-        self._observers: list[Observer] = list(plan.config.observers)
+        clock = WallClock()
+        self._called_ns = self._start_ns = clock.now_ns()  # the start moves to the first tick
+        config = scenario if isinstance(scenario, RunConfig) else RunConfig(scenario, **options)
+        prepared = self._prepared = prepare(config, clock)
+        self.plan, self.world, self.run_id = prepared.plan, prepared.world, prepared.run_id
+        self.metrics, self.live_events = prepared.metrics, prepared.live_events
+        self.controls, self.interrupt = prepared.controls, prepared.interrupt
+        self.stop_conditions: StopConditions | None = prepared.measured_stop
+        self._observers: list[Observer] = list(self.plan.config.observers)
         self._resources = ExitStack()  # everything that ends with the run
         self._run: Run | None = None
         self._result: Result | None = None
@@ -151,7 +86,7 @@ class Simulation:
     @property
     def folder(self) -> Path | None:
         """Path of the run folder, if there is one."""
-        return self._writer.path
+        return self._prepared.writer.path
 
     @property
     def tick(self) -> int:
@@ -180,7 +115,7 @@ class Simulation:
 
     def compiled_ns(self) -> int:
         """Return the wall time that this process has spent on compiling kernels for the run."""
-        return self._compiling.total_ns()
+        return self._prepared.compiling.total_ns()
 
     def watch(self, observer: Observer) -> None:
         """Add an observer before the run; one that raises is reported, counted and left out."""
@@ -192,13 +127,14 @@ class Simulation:
             raise RuntimeError("a simulation runs once; make another one")
         keep_memory()
         with ExitStack() as stack:
-            stack.push(self._writer.failed_to_start)
-            stack.enter_context(self._compiling)
-            run = self._run = self._open(stack)  # observers that begin read it
+            stack.push(self._prepared.writer.failed_to_start)
+            stack.enter_context(self._prepared.compiling)
+            # Set before observers begin, since they read `served` and `health`.
+            run = self._run = self._prepared.open(stack, self._observers, self.stop_conditions)
             with run.observers.begin(self.plan.static, agents_join=self.plan.config.listening is not None):
                 run.backend.start()
             self._resources = stack.pop_all()
-        self._start_ns = self._clock.now_ns()
+        self._start_ns = self._prepared.clock.now_ns()
         return self
 
     def step(self) -> Truth:
@@ -216,15 +152,15 @@ class Simulation:
         """Run up to tick `ticks`, or to the scenario's end, until all arenas have stopped, or until an interrupt."""
         run, until = self._open_run(), self.plan.ticks if ticks is None else ticks
         # Interrupted is raised while the run waits for runners; the summary has the ticks so far.
-        with self._priority(), suppress(Interrupted):
-            run.loop.run(until, self._is_stopped, partial(self._wait, run.status))
+        with self._prepared.priority(), suppress(Interrupted):
+            run.loop.run(until, self._prepared.is_stopped, partial(self._wait, run.status))
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         """End the agents, and close the records with a summary, also of a run that failed.
 
         RecordFailed if the summary cannot be written, unless the run failed; `result` is there all the same.
         """
-        run, end_ns = self._open_run(), self._clock.now_ns()
+        run, end_ns = self._open_run(), self._prepared.clock.now_ns()
         ended = self._ended(error)
         with self._resources:
             last = run.loop.end()
@@ -235,194 +171,16 @@ class Simulation:
                 wall_ns=end_ns - self._start_ns - self.controls.paused_ns,
                 start_ns=self._start_ns - self._called_ns,
             )
-            result = self._result = result_of(run, self.plan, self.world, self._writer, entries, outcome)
+            result = self._result = result_of(run, self.plan, self.world, self._prepared.writer, entries, outcome)
         try:
-            self._writer.close(result.summary(), run.observers.failed_records())
+            self._prepared.writer.close(result.summary(), run.observers.failed_records())
         except RecordFailed as lost:
             if error is None:
                 raise RecordFailed(str(lost), result) from lost
-            self._writer.report(str(lost))  # the error of the run itself is raised
-
-    def _check_machine(self) -> None:
-        """Raise BadInput if this machine is too small for the run, or cannot isolate its agents."""
-        plan = self.plan
-        if plan.isolation.strict:
-            check_isolation(plan.isolation)
-        need_open_files(plan.runners if plan.config.listening is None else plan.robots)
-        if plan.runners or plan.out is not None:  # a run without them has neither a network nor tables
-            need_address_space()
-            need_threads(plan.runners)
-
-    def _open(self, stack: ExitStack) -> Run:
-        """Make all parts of the run, which end with the stack."""
-        plan, writer, static = self.plan, self._writer, self.plan.static
-        if plan.interfaces:
-            plan.interfaces.check_machine(static, plan.factor)  # only here: a scenario can be checked on any machine
-        facts = writer.begin(plan.scenario, plan.facts())
-        if self._pace:  # kernels are loaded before gateways answer, and before the pace begins
-            world = plan.new_world()
-            warm_up(world, plan.new_medium(world), plan.metrics, subticks=plan.subtick_s is not None)
-        interfaces = served = None
-        if plan.interfaces and self._pace:
-            interfaces = stack.enter_context(plan.interfaces.open(static, self._pace, writer.path))
-        if plan.gateways:
-            served = stack.enter_context(self._serve(plan.gateways, has_interfaces=interfaces is not None))
-        if served and interfaces:
-            stack.enter_context(interfaces.with_gateways(served.robot_addresses()))
-        endpoint = self._observer_endpoint(stack)
-        log = RunnerLog(writer.report)
-        backend = stack.enter_context(open_backend(self._backend_settings(log), served))
-        loop = self._new_loop(backend, interfaces, log)
-        status = self._new_status(backend, loop)
-        staged = self._staged_observers(status, endpoint)
-        if served:
-            staged.append(StagedObserver(ObserverStage.PROGRAMS, Undriven(served, self._factor, writer.report)))
-        if interfaces:
-            staged.append(StagedObserver(ObserverStage.PROGRAMS, InterfacesLog(interfaces, writer.report)))
-        observers = RunObservers(staged, writer.report)
-        loop.observers = observers.ordered
-        return Run(loop, backend, observers, status, served, facts, log)
-
-    def _serve(self, gateways: RunGateways, *, has_interfaces: bool) -> AbstractContextManager[Served]:
-        writer, agents = self._writer, self.plan.agents
-        return gateways.serve(
-            self.world, agents, self._clock, self._factor, writer.path, writer.report, separate=has_interfaces
-        )
-
-    def _observer_endpoint(self, stack: ExitStack) -> ObserverEndpoint:
-        """Return the endpoint of observers.
-
-        An endpoint beyond this machine opens at once, so that one in use is refused before agents join, by BadInput.
-        """
-        listening = self.plan.config.listening
-        endpoint = ObserverEndpoint(listening.for_observers(self.run_id) if listening else None)
-        if listening and listening.observed and self._writer.path:
-            stack.callback(endpoint.close)
-            endpoint.open()
-        return endpoint
-
-    def _backend_settings(self, log: RunnerLog) -> BackendSettings:
-        plan, pace, subticks = self.plan, self._pace, None
-        if pace and plan.subtick_s:
-            subticks = Subticks(self._clock, pace, plan.static.rate_hz, plan.subtick_s)
-        return BackendSettings(plan, self.run_id, self._clock, pace, subticks, log, self._is_stopped)
-
-    def _new_loop(self, backend: AgentBackend, interfaces: OpenInterfaces | None, log: RunnerLog) -> Loop:
-        """Return the loop, without observers; actions that need not follow from the seed are recorded in the folder."""
-        plan, replay = self.plan, self.plan.config.replay
-        acting = backend
-        if replay and replay.inputs:
-            acting = ReplayedBackend(backend, replay.inputs, plan.robots, plan.static.rate_hz)
-        if interfaces:
-            subtick_ns = to_ns((plan.subtick_s or 0.0) * self._factor)
-            acting = InterfacesBackend(cast("TimedBackend", acting), interfaces.ports, subtick_ns)
-        acting = self._writer.record_actions(acting, partial(self._has_external_actions, backend, log))
-        return Loop(
-            self.world,
-            plan.new_medium(self.world, plan.config.threads),
-            acting,
-            (),
-            plan.scenario.events,
-            self.stop_conditions,
-            self.live_events,
-            cast("TimedBackend", acting) if plan.recorded_subtick_s is not None else None,
-            interfaces.follow if interfaces else None,
-        )
-
-    def _has_external_actions(self, backend: AgentBackend, log: RunnerLog, tick: int) -> bool:
-        """Return True if the actions of this tick need not follow from scenario and seed.
-
-        Called in each tick up to the first for which it returns True.
-        """
-        plan, replay = self.plan, self.plan.config.replay
-        if replay and replay.inputs:
-            return tick >= replay.inputs.first_tick
-        if tick == 0 and (health := runner_health(backend)) and (health.robots_free or health.foreign):
-            return True
-        in_real_time = self._pace is not None and (plan.runners > 0 or plan.subtick_s is not None)
-        has_changed = bool(log.losses) or any(event.tick >= 0 for event in log.events)
-        return in_real_time or has_changed or plan.gateways is not None
-
-    def _new_status(self, backend: AgentBackend, loop: Loop) -> Status:
-        return Status(
-            run_id=self.run_id,
-            scenario=self.plan.scenario.name,
-            ticks=self.plan.ticks,
-            metrics=self.metrics,
-            controls=self.controls,
-            clock=self._clock,
-            health=partial(runner_health, backend),
-            counts=loop.counts,
-            radio=lambda: self.live_events.progress.radio,
-            events=self.live_events.listing,
-            compiled_ns=self._compiling.total_ns,
-        )
-
-    def _staged_observers(self, status: Status, endpoint: ObserverEndpoint) -> list[StagedObserver]:
-        """Return the observers of any run, those that write its folder and publish it, and those of the caller."""
-        writer = self._writer
-        staged = [
-            (ObserverStage.MEASUREMENT, self.metrics),
-            *([(ObserverStage.MEASUREMENT, self._measured_stop)] if self._measured_stop else []),
-            (ObserverStage.STATUS, status),
-            (ObserverStage.SUMMARY, RadioTally()),
-            (ObserverStage.SUMMARY, EventLog()),
-            (ObserverStage.WARNING, TooLarge(writer.report)),
-            (ObserverStage.WARNING, EmptyBatteries(writer.report)),
-            (ObserverStage.WARNING, MemoryReturn(self._clock)),
-            *((ObserverStage.CALLER, observer) for observer in self._observers),
-        ]
-        if writer.path:
-            staged += ((ObserverStage.RECORD, observer) for observer in self._recorders(writer.path))
-            staged.append((ObserverStage.PUBLICATION, self._new_published(writer.path, status, endpoint)))
-        return [StagedObserver(stage, observer) for stage, observer in staged]
-
-    def _recorders(self, folder: Path) -> list[Observer]:
-        """Return the observers that write the run folder; they may drop rows only in real time."""
-        record, metrics, clock = self.plan.record, self.metrics, self._clock
-        observers: list[Observer] = [TrajectoryLog(folder, self.hashes)]  # first: it has each tick of a killed run
-        if record.tables:
-            topics = {DICT_TAG: "dict", FRAME_TAG: "frame"} | {kind.tag: kind.__name__ for kind in message_classes()}
-            may_drop = self._pace is not None
-            options = RecordOptions(
-                folder, metrics, clock, record.packets, topics, links=record.links, may_drop=may_drop
-            )
-            observers += recorders(options)
-        if record.rrd:
-            observers.append(RerunRecording(folder / RECORDING, metrics, clock, selected=record.select))
-        return observers
-
-    def _new_published(self, folder: Path, status: Status, endpoint: ObserverEndpoint) -> Published:
-        events, note = self.live_events, self._writer.note
-        published = Published(
-            folder,
-            self.run_id,
-            self.metrics,
-            self._clock,
-            selected=self.plan.record.select,
-            declare=ControlServer(status, self.controls, events.submit, events.end, note).declare,
-            endpoint=endpoint,
-        )
-        self.controls.on_pause = published.catch_up
-        return published
-
-    @property
-    def _factor(self) -> float:
-        """Simulated s per s of wall time in real time, else 1."""
-        return self._pace.factor if self._pace else 1.0
-
-    def _priority(self) -> AbstractContextManager[None]:
-        """Return a context in which the loop of a real-time run has priority over other processes."""
-        if self._pace is None:
-            return nullcontext()
-        # With sub-ticks the priority matters so much that the message is also printed.
-        return raised_priority(self._writer.report if self.plan.subtick_s else self._writer.note)
-
-    def _is_stopped(self) -> bool:
-        return self.interrupt.requested or self.controls.quit_requested
+            self._prepared.writer.report(str(lost))  # the error of the run itself is raised
 
     def _wait(self, status: Status, tick: int) -> None:
-        self.controls.wait(tick, self._is_stopped)
+        self.controls.wait(tick, self._prepared.is_stopped)
         status.began()
 
     def _open_run(self) -> Run:
@@ -439,7 +197,7 @@ class Simulation:
             return "stopped"
         if self.tick >= self.plan.ticks:
             return "duration"
-        return "interrupted" if self._is_stopped() else "left"
+        return "interrupted" if self._prepared.is_stopped() else "left"
 
 
 def run_to_end(simulation: Simulation) -> Result:
