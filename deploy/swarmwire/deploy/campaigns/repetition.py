@@ -7,8 +7,8 @@ from typing import Any
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.deploy.campaigns.folder import code_changes
 from swarmwire.deploy.campaigns.store import CampaignWriter
-from swarmwire.deploy.campaigns.sweep import code_changes
 from swarmwire.deploy.runs.config import Recording, Replay, Runners
 from swarmwire.deploy.runs.record.inputs import RecordedInputs, recorded_inputs
 from swarmwire.deploy.runs.record.provenance import RunFacts, changed_files, read_facts

@@ -49,23 +49,6 @@ def storing(folder: Path, command: str = "sweep") -> Generator[None]:
         raise StorageFailed(text) from error
 
 
-@contextmanager
-def new_folder(folder: Path, kind: str) -> Generator[Path]:
-    """Make the folder of a campaign or a tuning, and yield the empty folder for its scenario.
-
-    BadInput unless `folder` is new or empty, and can be written.
-    """
-    scenario_folder = folder / SCENARIO_FOLDER
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if any(folder.iterdir()):
-            raise BadInput("out", str(folder), f"expected a new or empty folder; to continue a {kind}: `resume`")
-        scenario_folder.mkdir()  # fails in all but one of several processes that begin here at once
-        yield scenario_folder
-    except OSError as error:
-        raise BadInput("out", str(folder), f"expected a folder that can be written: {error.strerror}") from error
-
-
 class CampaignWriter:
     """Writes and resumes the folder of a campaign. StorageFailed if it cannot be written.
 

@@ -8,56 +8,30 @@ from tempfile import TemporaryDirectory
 from typing import Any, Protocol, cast
 
 from swarmwire.comms.base.atomic import folder_lock
-from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaigns.design import GRID, Point, vary_from
+from swarmwire.deploy.campaigns.design import GRID, vary_from
+from swarmwire.deploy.campaigns.folder import check_resumable, copied_overrides, new_folder, provenance
 from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, OnResult, execute, open_executor, tasks_of
-from swarmwire.deploy.campaigns.spec import CampaignPlan, SweepSpec, overrides_of, plan_of
-from swarmwire.deploy.campaigns.store import CampaignWriter, new_folder
+from swarmwire.deploy.campaigns.spec import CampaignPlan, SweepSpec, plan_of
+from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
 from swarmwire.deploy.runs.config import SeedsOption, seed_list
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.record.folder import stamped_folder
-from swarmwire.deploy.runs.record.provenance import (
-    Copies,
-    changed_files,
-    changes_since,
-    copied_mapping,
-    copy_scenario,
-    cpu,
-    module_digests,
-    versions,
-)
+from swarmwire.deploy.runs.record.provenance import Copies
 from swarmwire.metrics.records.campaign.campaign_json import (
     FAILED,
     SCENARIO_FOLDER,
     Campaign,
     Design,
-    Provenance,
     read_campaign,
     write_campaign,
 )
-from swarmwire.metrics.records.run_folder.layout import CopiedFile
 from swarmwire.world.scenario.scenario import Scenario
 
+CAMPAIGNS = "campaigns"  # default folder of campaigns
 # Fields that must be equal in a plan and in the campaign that it resumes.
 COMPARED_FIELDS = ("files", "overrides", "design", "seeds", "vary", "points")
-
-
-def default_folder(scenario: str) -> Path:
-    """Return campaigns/<scenario>-<UTC>, by `stamped_folder`."""
-    return stamped_folder(Path("campaigns") / scenario)
-
-
-def begin(plan: CampaignPlan, folder: Path, command: str) -> Campaign:
-    """Make the folder with the scenario's files, and write `campaign.json` last.
-
-    BadInput unless the folder is new or empty, and can be made.
-    """
-    with new_folder(folder, "campaign") as scenario_folder:
-        campaign = campaign_of(plan, scenario_folder, command)
-        write_campaign(campaign, folder)
-    return campaign
 
 
 def campaign_of(plan: CampaignPlan, scenario_folder: Path, command: str) -> Campaign:
@@ -66,7 +40,7 @@ def campaign_of(plan: CampaignPlan, scenario_folder: Path, command: str) -> Camp
     copies = Copies(scenario_folder)
     point_overrides = tuple(tuple(copied_overrides(plan, point, copies)) for point in plan.points)
     return Campaign(
-        **provenance(scenario, command, plan.code, copy_scenario(scenario, spec.seeds, scenario_folder, copies)),
+        **provenance(scenario, spec.seeds, command, plan.code, copies),
         name=spec.name or scenario.name,
         design=cast("Design", spec.design),  # `points_of` has checked it
         seeds=spec.seeds,
@@ -81,53 +55,6 @@ def campaign_of(plan: CampaignPlan, scenario_folder: Path, command: str) -> Camp
         record_seeds=spec.record_seeds,
         batch=spec.batch,
     )
-
-
-def provenance(
-    scenario: Scenario, command: str, code: tuple[str, ...], files: tuple[CopiedFile, ...]
-) -> dict[str, Any]:
-    """Return the present values of the fields of `Provenance`; `code` has the specs of users' classes."""
-    return {
-        "scenario": scenario.name,
-        "command": command,
-        "began_utc": WallClock().utc_stamp(),
-        "versions": versions(),
-        "cpu": cpu(),
-        "modules": module_digests(code),
-        "files": files,
-    }
-
-
-def copied_overrides(plan: CampaignPlan, point: Point, copies: Copies) -> list[str]:
-    """Return the values of a point as overrides of the copied scenario; files that they name are copied, too."""
-    if not any(isinstance(value, str | list) for value in point.values()):
-        return overrides_of(point)
-    copied = copied_mapping(plan.scenario_at(point), copies)
-    return overrides_of({path: _value_at(copied, path) for path in point})
-
-
-def _value_at(mapping: Mapping[str, Any], path: str) -> Any:
-    value: Any = mapping
-    for key in path.split("."):
-        value = cast("list[Any]", value)[int(key)] if isinstance(value, list) else value[key]
-    return value
-
-
-def check_resumable(begun: Provenance, folder: Path, *, force: bool) -> None:
-    """Raise BadInput if the scenario's files, or, unless `force`, code, versions or CPU have changed."""
-    changed = changed_files(begun.files, folder / SCENARIO_FOLDER)
-    if changed:
-        raise BadInput(f"--resume {folder}", "", f"{SCENARIO_FOLDER}/{changed[0]}")
-    changed = [] if force else code_changes(begun)
-    if changed:
-        more = f" (and {len(changed) - 1} more)" if len(changed) > 1 else ""
-        expected = f"{changed[0]}{more}: runs would not be comparable; --force resumes all the same"
-        raise BadInput(f"--resume {folder}", "", expected)
-
-
-def code_changes(begun: Provenance) -> list[str]:
-    """Return changes of code, versions and CPU since the beginning, a line each."""
-    return changes_since(begun.modules, begun.versions, begun.cpu, [f"{module}:" for module in begun.modules])
 
 
 def check_same(plan: CampaignPlan, campaign: Campaign, folder: Path) -> None:
@@ -246,7 +173,7 @@ def sweep(
         record_seeds=seed_list(record_seeds, "record_seeds") if record_seeds else (),
     )
     plan = plan_of(spec)
-    folder = Path(out) if out is not None else default_folder(_stem(scenario))
+    folder = Path(out) if out is not None else stamped_folder(Path(CAMPAIGNS, _stem(scenario)))
     options = ExecutionOptions(executor, workers, observer=observer or NoObserver())
     return begin_sweep(plan, folder, "swarmwire.deploy.sweep", options)
 
@@ -273,9 +200,11 @@ def resume(
 def begin_sweep(plan: CampaignPlan, path: Path, command: str, options: ExecutionOptions) -> Sweep:
     """Make the folder of a checked campaign, and run it; `command` is recorded in it."""
     with _executor(options, path) as executor:
-        folder = CampaignWriter(path, begin(plan, path, command))
+        with new_folder(path, "campaign") as scenario_folder:
+            campaign = campaign_of(plan, scenario_folder, command)
+            write_campaign(campaign, path)  # last: the folder has all files of the scenario by then
         with folder_lock(path, "campaign"):
-            return _work(folder, {}, executor, options)
+            return _work(CampaignWriter(path, campaign), {}, executor, options)
 
 
 def resume_sweep(

@@ -20,7 +20,7 @@ from swarmwire.deploy.campaigns.sweep import CampaignObserver, ExecutionOptions,
 from swarmwire.deploy.campaigns.tuning.spec import Goal, Tuning, scenario_file
 from swarmwire.deploy.campaigns.tuning.study import TuningTrial
 from swarmwire.deploy.runs.controls import Interrupt
-from swarmwire.deploy.runs.record.provenance import FILES, copy_scenario
+from swarmwire.deploy.runs.record.provenance import FILES, Copies, copy_scenario
 from swarmwire.metrics.records.campaign.campaign_json import CAMPAIGN_FILE
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.run_folder.layout import SCENARIO
@@ -47,7 +47,7 @@ def write_best(folder: Path, tuning: Tuning, trial: TuningTrial) -> Path:
     """Write `best.toml` and `files/` into a tuning's folder; StorageFailed if they cannot be written."""
     scenario = load_scenario(scenario_file(folder), tuning.overrides_of(trial.parameters))
     with storing(folder, "tune"), tempfile.TemporaryDirectory(prefix=".aside-best-", dir=folder) as temporary:
-        copy_scenario(scenario, (scenario.seed,), Path(temporary))
+        copy_scenario(scenario, (scenario.seed,), Copies(Path(temporary)))
         shutil.rmtree(folder / FILES, ignore_errors=True)
         if (Path(temporary) / FILES).exists():
             (Path(temporary) / FILES).replace(folder / FILES)

@@ -11,10 +11,11 @@ from typing import Protocol
 from swarmwire.comms.base.atomic import folder_lock, write_bytes
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.deploy.campaigns.columns import Row
+from swarmwire.deploy.campaigns.folder import check_resumable, copied_overrides, new_folder, provenance
 from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, batch_for, execute, open_executor, shares
 from swarmwire.deploy.campaigns.spec import CampaignPlan
-from swarmwire.deploy.campaigns.store import new_folder, storing
-from swarmwire.deploy.campaigns.sweep import CampaignObserver, check_resumable, copied_overrides, provenance
+from swarmwire.deploy.campaigns.store import storing
+from swarmwire.deploy.campaigns.sweep import CampaignObserver
 from swarmwire.deploy.campaigns.tuning.best import CheckRun, FreshCheck, best_of, write_best
 from swarmwire.deploy.campaigns.tuning.spec import (
     Goal,
@@ -30,40 +31,19 @@ from swarmwire.deploy.campaigns.tuning.spec import (
 from swarmwire.deploy.campaigns.tuning.study import StudyFile, TrialResult, TuningTrial, importance_of, proposals
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
 from swarmwire.deploy.runs.controls import Interrupt
-from swarmwire.deploy.runs.record.folder import stamped_folder
-from swarmwire.deploy.runs.record.provenance import Copies, copy_scenario
+from swarmwire.deploy.runs.record.provenance import Copies
 from swarmwire.metrics.records.campaign.campaign_json import FAILED, SCENARIO_FOLDER
 from swarmwire.metrics.records.run_folder.writer import PARQUET
 
+TUNINGS = "tunings"  # default folder of tunings
 FILE = "trials.parquet"
-
-
-def default_tuning_folder(scenario: str) -> Path:
-    """Return tunings/<scenario>-<UTC>, by `stamped_folder`."""
-    return stamped_folder(Path("tunings") / scenario)
-
-
-def begin_tuning(plan: TuningPlan, folder: Path, command: str) -> Tuning:
-    """Make the folder with the scenario's files, and write `tuning.json` last.
-
-    BadInput unless the folder is new or empty, and can be made.
-    """
-    with new_folder(folder, "tuning") as scenario_folder:
-        tuning = _tuning_of(plan, scenario_folder, command)
-        write_tuning(tuning, folder)
-    return tuning
 
 
 def _tuning_of(plan: TuningPlan, scenario_folder: Path, command: str) -> Tuning:
     spec, copies = plan.spec, Copies(scenario_folder)
     searches = [_copied(search, ends, copies) for search, ends in zip(plan.searches, plan.ends, strict=True)]
     return Tuning(
-        **provenance(
-            plan.scenario,
-            command,
-            plan.code,
-            copy_scenario(plan.scenario, (plan.scenario.seed,), scenario_folder, copies),
-        ),
+        **provenance(plan.scenario, (plan.scenario.seed,), command, plan.code, copies),
         overrides=spec.overrides,
         searches=tuple(searches),
         goal=plan.goal,
@@ -246,7 +226,9 @@ class Tuned:
 
 def begin_tune(plan: TuningPlan, folder: Path, command: str, workers: int | None, observers: TuneObservers) -> Tuned:
     """Make the folder of a checked tuning, and run it; `command` is recorded in it."""
-    tuning = begin_tuning(plan, folder, command)
+    with new_folder(folder, "tuning") as scenario_folder:
+        tuning = _tuning_of(plan, scenario_folder, command)
+        write_tuning(tuning, folder)  # last: the folder has all files of the scenario by then
     with folder_lock(folder, "tuning"):
         return _work(folder, tuning, workers, observers)
 

@@ -3,6 +3,7 @@
 import shlex
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -10,13 +11,14 @@ import typer
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.design import vary_of
 from swarmwire.deploy.campaigns.spec import CampaignPlan, SweepSpec, campaign_file, plan_of, spec_in
-from swarmwire.deploy.campaigns.sweep import ExecutionOptions, begin_sweep, default_folder, resume_sweep
+from swarmwire.deploy.campaigns.sweep import CAMPAIGNS, ExecutionOptions, begin_sweep, resume_sweep
 from swarmwire.deploy.cli.display.sweep import SweepProgress, print_sweep
 from swarmwire.deploy.cli.options import INTERRUPTED, leaving_when_hung_up
 from swarmwire.deploy.cli.sweep import SweepOptions
 from swarmwire.deploy.machine import program
 from swarmwire.deploy.runs.config import SEEDS, seed_list
 from swarmwire.deploy.runs.controls import Interrupt
+from swarmwire.deploy.runs.record.folder import stamped_folder
 from swarmwire.deploy.terminal.console import TerminalConsole
 
 
@@ -33,7 +35,7 @@ def run_sweep(options: SweepOptions) -> None:
         elif plan is None or options.source is None:
             raise BadInput("SCENARIO", "", "is missing: expected a scenario or a campaign, or --resume with a folder")
         else:
-            folder = options.out or default_folder(options.source.stem)
+            folder = options.out or stamped_folder(Path(CAMPAIGNS, options.source.stem))
             sweep = begin_sweep(plan, folder, shlex.join(["swarmwire", *sys.argv[1:]]), execution)
     print_sweep(sweep, console, program())
     if not sweep.is_over:

@@ -2,11 +2,12 @@
 
 import shlex
 import sys
+from pathlib import Path
 
 import typer
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaigns.tuning.run import TuneObservers, begin_tune, default_tuning_folder, resume_tune
+from swarmwire.deploy.campaigns.tuning.run import TUNINGS, TuneObservers, begin_tune, resume_tune
 from swarmwire.deploy.campaigns.tuning.spec import TuningPlan, TuningSpec, fresh_seeds, search_of, tuning_plan
 from swarmwire.deploy.cli.display.sweep import SweepProgress
 from swarmwire.deploy.cli.display.tune import TuneProgress, print_tuned
@@ -15,6 +16,7 @@ from swarmwire.deploy.cli.sweep import CHECK_SEEDS, PARALLEL_TRIALS, SAMPLER_SEE
 from swarmwire.deploy.machine import program
 from swarmwire.deploy.runs.config import seed_list
 from swarmwire.deploy.runs.controls import Interrupt
+from swarmwire.deploy.runs.record.folder import stamped_folder
 from swarmwire.deploy.terminal.console import TerminalConsole
 
 
@@ -25,7 +27,7 @@ def tune_scenario(options: TuneOptions) -> None:
     with leaving_when_hung_up(interrupt):
         if options.resume is None:
             plan = _plan(options)
-            folder = options.out or default_tuning_folder(plan.spec.scenario.stem)
+            folder = options.out or stamped_folder(Path(TUNINGS, plan.spec.scenario.stem))
             tuned = begin_tune(plan, folder, shlex.join(["swarmwire", *sys.argv[1:]]), options.workers, observers)
         else:
             _refuse_with_resume(options)

@@ -18,7 +18,7 @@ from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.comms.observe.interfaces import AgentBackend, TimedBackend
 from swarmwire.deploy.machine import refusal
 from swarmwire.deploy.runs.record.inputs import InputsRecord, RecordedBackend
-from swarmwire.deploy.runs.record.provenance import RunFacts, copy_scenario
+from swarmwire.deploy.runs.record.provenance import Copies, RunFacts, copy_scenario
 from swarmwire.deploy.runs.record.replay_logs import LiveEventsLog, LiveEventsRecord
 from swarmwire.metrics.records.run_folder.layout import LOG, SUMMARY, RunLog
 from swarmwire.world.live_events import LiveEvent
@@ -66,7 +66,7 @@ class RunWriter:
         """Copy the files of the run into the folder; return the facts with these files. RecordFailed if that fails."""
         if self.path:
             try:
-                facts = replace(facts, files=copy_scenario(scenario, facts.seeds, self.path))
+                facts = replace(facts, files=copy_scenario(scenario, facts.seeds, Copies(self.path)))
                 facts.write(self.path)
             except OSError as error:
                 raise self._refused(self.path, error) from error

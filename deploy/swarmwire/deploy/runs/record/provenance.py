@@ -163,18 +163,12 @@ _digest_once = cache(_digest)
 FILES = "files"
 
 
-def copy_scenario(
-    scenario: Scenario, seeds: tuple[int, ...], folder: Path, copies: "Copies | None" = None
-) -> tuple[CopiedFile, ...]:
-    """Write `scenario.toml`, with the first seed, and `files/` into the run folder; return the files.
-
-    `copies` are the files that the folder has already.
-    """
-    copies = copies or Copies(folder)
+def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], copies: "Copies") -> tuple[CopiedFile, ...]:
+    """Write `scenario.toml`, with the first seed, and `files/` into the folder of the copies; return all its files."""
     mapping = copied_mapping(scenario, copies)
     mapping["seed"] = seeds[0]
     text = f"{_header(scenario)}\n{tomli_w.dumps(mapping)}".encode()
-    write_bytes(folder / SCENARIO, text)
+    write_bytes(copies.folder / SCENARIO, text)
     return (CopiedFile(SCENARIO, _sha256(text), "scenario"), *copies.files)
 
 
@@ -223,10 +217,10 @@ def changed_files(files: tuple[CopiedFile, ...], folder: Path) -> list[str]:
 
 
 class Copies:
-    """The copies in one run folder: one of each original, and different names for originals of one name."""
+    """The copies in one folder: one of each original, and different names for originals of one name."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
         self._paths: dict[Path, str] = {}  # path of the copy of each original
         self.files: list[CopiedFile] = []
 
@@ -235,8 +229,8 @@ class Copies:
         if original not in self._paths:
             path = self._free_path(original)
             data = original.read_bytes() if content is None else content
-            make_subfolder(self._folder / FILES)
-            write_bytes(self._folder / path, data)
+            make_subfolder(self.folder / FILES)
+            write_bytes(self.folder / path, data)
             self._paths[original] = path
             self.files.append(CopiedFile(path, _sha256(data), role))
         return self._paths[original]
