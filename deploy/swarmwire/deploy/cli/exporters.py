@@ -51,37 +51,37 @@ ARENA = Exporter(
     "the arena at one time",
     PICTURE_SUFFIXES,
     frozenset({"at_s", "arena", "metrics", "size_px"}),
-    "pictures:write_arena",
+    "export_pictures:write_arena",
 )
 DELIVERY = Exporter(
     "delivery",
     "the PDR (received / intended receivers) over distance",
     PICTURE_SUFFIXES,
     frozenset({"arena", "size_px"}),
-    "pictures:write_delivery",
+    "export_pictures:write_delivery",
 )
 VIEWER = Exporter(
     "viewer",
     "the recording as rerun's viewer shows it; needs a Vulkan driver",
     (".png",),
     frozenset({"at_s"}),
-    "pictures:write_viewer",
+    "export_pictures:write_viewer",
 )
-GIF = Exporter("film", "a film", (".gif",), FILM_OPTIONS, "pictures:write_gif_film")
-MP4 = Exporter("film", "a film", (".mp4",), FILM_OPTIONS, "pictures:write_mp4_film")
+GIF = Exporter("film", "a film", (".gif",), FILM_OPTIONS, "export_pictures:write_gif_film")
+MP4 = Exporter("film", "a film", (".mp4",), FILM_OPTIONS, "export_pictures:write_mp4_film")
 CAPTURE = Exporter(
     "capture",
     "the frames on air, for Wireshark",
     (".pcapng",),
     frozenset({"from_s", "until_s", "arena"}),
-    "capture:write_frames",
+    "export_capture:write_frames",
 )
 METRICS = Exporter(
     "metrics",
     "metrics over time",
     (".csv",),
     frozenset({"from_s", "until_s", "arena", "metrics"}),
-    "metrics_table:write_table",
+    "export_metrics_table:write_table",
 )
 
 EXPORTERS = (ARENA, DELIVERY, VIEWER, GIF, MP4, CAPTURE, METRICS)

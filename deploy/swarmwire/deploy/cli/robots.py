@@ -42,7 +42,9 @@ def select_robots(
 
 def run_work(work: "Callable[[Watcher], Awaitable[Result]]") -> Result:
     """Run the work, show its progress and return its result; Interrupted by Ctrl-C."""
-    from swarmwire.deploy.robots.progress import run_with_progress  # loads asyncio and rich, which --help does not need
+    from swarmwire.deploy.cli.display.robots import (
+        run_with_progress,  # loads asyncio and rich, which --help does not need
+    )
 
     return run_with_progress(work)
 

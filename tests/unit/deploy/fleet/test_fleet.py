@@ -12,13 +12,13 @@ import tomli_w
 from rich.console import Console
 
 from swarmwire.comms.base.errors import BadInput, Interrupted
+from swarmwire.deploy.cli.display.robots import progress_watcher
 from swarmwire.deploy.cli.robots import run_work
 from swarmwire.deploy.robots.archives import ArchiveEntry, name_of, write_archive
 from swarmwire.deploy.robots.fleet import Fleet, Host, hosts_of
 from swarmwire.deploy.robots.fleet_file import FleetTable, RobotTable, read_fleet
 from swarmwire.deploy.robots.host_side.messages import HostFacts
 from swarmwire.deploy.robots.packages import RobotPlatform, pins
-from swarmwire.deploy.robots.progress import progress_watcher
 from swarmwire.deploy.robots.release import release_entries, robot_settings
 from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, result_lines
 from tests.support.deploy.runs import ROOT

@@ -6,8 +6,7 @@ import threading
 import pytest
 from fastapi.testclient import TestClient
 
-from swarmwire.deploy.live.page.tape import Tape
-from swarmwire.deploy.live.page.web_viewer import PAGE, viewer_app
+from swarmwire.deploy.live.page.web_viewer import PAGE, GrowingRecording, viewer_app
 
 PORT = 12345
 HOST = f"127.0.0.1:{PORT}"
@@ -17,7 +16,7 @@ PATHS = ["", "run.rrd", *CODE, *sorted(path.name for path in PAGE.iterdir())]
 
 @pytest.fixture
 def tape():
-    tape = Tape(100)
+    tape = GrowingRecording(100)
     tape.write(b"head")
     tape.write(b"tick")
     tape.close()
@@ -71,7 +70,7 @@ def read(tape, parts):
 
 
 def test_tape_drops_the_oldest_parts_but_for_the_constants():
-    tape = Tape(2)
+    tape = GrowingRecording(2)
     for part in (b"head", b"1", b"2", b"3"):
         tape.write(part)
     assert read(tape, 3) == [b"head", b"2", b"3"]
@@ -80,7 +79,7 @@ def test_tape_drops_the_oldest_parts_but_for_the_constants():
 
 
 def test_tape_readers_wait_for_parts_and_end_when_it_is_closed():
-    tape = Tape(100)
+    tape = GrowingRecording(100)
 
     async def all_parts():
         got = []
@@ -103,7 +102,7 @@ def test_tape_readers_wait_for_parts_and_end_when_it_is_closed():
 
 
 def test_tape_leaves_out_what_was_dropped_before_a_slow_reader_came_to_it():
-    tape = Tape(2)
+    tape = GrowingRecording(2)
 
     async def slow():
         reading = tape.read()

@@ -38,7 +38,7 @@ def export(run: Path, to: Path, options: ExportOptions, kind: str | None = None)
             expected = f"expected --to with {', '.join(suffixes)}; {to.suffix} ({exporter.name}) does not use it"
             raise BadInput(flag, "", expected)
     module, _, function = exporter.function.partition(":")
-    writer = getattr(import_module(f"swarmwire.deploy.cli.actions.export_{module}"), function)
+    writer = getattr(import_module(f"swarmwire.deploy.cli.actions.{module}"), function)
     return cast("Writer", writer)(run, to, options)
 
 
