@@ -7,11 +7,12 @@
 import argparse
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 from swarmwire.comms.base.config import (
+    bounds_of,
     check_format,
     check_plain,
     did_you_mean,
@@ -44,12 +45,12 @@ class RadioSettings:
 
     kind: str = parameter(
         "none",
-        help="the robots' own network, the emulated medium of a world, or none",
+        help="zenoh: the robots' own network; world: the emulated medium of a world; none",
         choices=("zenoh", "world", "none"),
     )
     max_payload_bytes: int = parameter(
         100,
-        help="largest message, tag included; larger ones are not sent",
+        help="size of the largest message, tag included; larger messages are not sent",
         unit="B",
         at_least=2,
         at_most=65535,
@@ -77,7 +78,7 @@ class RobotSettings:
     swarm: str = parameter("swarm", help="name of the swarm, the root of its keys")
     robots: tuple[str, ...] = ()  # all robots of the swarm, by index; read settings have at least one
     params: dict[str, Any] = field(default_factory=dict[str, Any])
-    body: str = parameter("", help="name of a body, or a file beside this one; default: the driver's")
+    body: str = parameter("", help="name of a body, or its data sheet; default: the driver's")
     rate_hz: int = parameter(10, help="steps of the agent per second", unit="Hz", at_least=1, at_most=1000)
     watchdog_s: float = parameter(
         0.5,
@@ -188,50 +189,53 @@ class Flag(NamedTuple):
 
     name: str
     key: str
-    help: str
     metavar: str = "VALUE"
     kind: str = "value"  # or "text", "path", "spec", "true", "list" (repeatable), "pairs" (K=V, repeatable)
+    text: str = ""  # help; "": that of the key
+
+    @property
+    def help(self) -> str:
+        """Help of the flag."""
+        *tables, name = self.key.split(".")
+        kind: Any = RobotSettings
+        for table in tables if not self.text else ():
+            kind = get_type_hints(kind)[table]
+        return self.text or next(bounds_of(option).help for option in fields(kind) if option.name == name)
 
 
 AGENT = "AGENT"
 FLAGS = (
-    Flag("--driver", "driver.name", "driver of the robot: see `swarmwire-agent drivers`", "NAME", "text"),
-    Flag("--address", "driver.address", "address of the robot, in the driver's format", "ADDRESS", "text"),
-    Flag("--option", "driver", "an option of the driver", "K=V", "pairs"),
-    Flag(
-        "--radio",
-        "radio.kind",
-        "zenoh: the robots' own network; world: a world's medium; none",
-        "KIND",
-        "text",
-    ),
-    Flag("--max-payload-bytes", "radio.max_payload_bytes", "size of the largest message, tag included", "N"),
-    Flag("--name", "name", "name of this robot", "NAME", "text"),
-    Flag("--swarm", "swarm", "name of the swarm", "NAME", "text"),
+    Flag("--driver", "driver.name", "NAME", "text", "driver of the robot: see `swarmwire-agent drivers`"),
+    Flag("--address", "driver.address", "ADDRESS", "text"),
+    Flag("--option", "driver", "K=V", "pairs", "an option of the driver"),
+    Flag("--radio", "radio.kind", "KIND", "text"),
+    Flag("--max-payload-bytes", "radio.max_payload_bytes", "N"),
+    Flag("--name", "name", "NAME", "text"),
+    Flag("--swarm", "swarm", "NAME", "text"),
     Flag(
         "--robot",
         "robots",
-        "a robot of the swarm, this one included: repeat for each, in the same order on all robots",
         "NAME",
         "list",
+        "a robot of the swarm, this one included: repeat for each, in the same order on all robots",
     ),
-    Flag("--body", "body", "name of a body, or a body sheet; default: the driver's", "NAME", "spec"),
-    Flag("--param", "params", "a parameter of the agent", "K=V", "pairs"),
-    Flag("--rate-hz", "rate_hz", "steps of the agent per second", "N"),
-    Flag("--watchdog-s", "watchdog_s", "delay of the agent that stops the motors; needs a working link", "S"),
-    Flag("--max-linear-mps", "max_linear_mps", "highest speed; default: half the body's", "V"),
-    Flag("--max-angular-radps", "max_angular_radps", "highest turn rate; default: half the body's", "W"),
-    Flag("--tracker", "tracker", "receive robots' poses over the network", kind="true"),
-    Flag("--listen", "network.listen", "endpoint for other robots: tcp/127.0.0.1:7547", "ENDPOINT", "list"),
-    Flag("--connect", "network.connect", "endpoint to connect to: tcp/127.0.0.1:7548", "ENDPOINT", "list"),
-    Flag("--multicast", "network.multicast", "discover robots in the local network", kind="true"),
-    Flag("--ca", "network.ca", "certificate of the authority that signed all others", "FILE", "path"),
-    Flag("--certificate", "network.certificate", "the robot's certificate", "FILE", "path"),
-    Flag("--key", "network.key", "private key of the certificate", "FILE", "path"),
-    Flag("--insecure", "network.insecure", "connect beyond this machine without certificates", kind="true"),
-    Flag("--log", "log", "folder for the logs; default: none", "FOLDER", "path"),
-    Flag("--pace", "pace", "factor of the wall clock's speed, for an emulated robot", "X"),
-    Flag("--seed", "seed", "seed of the agent's random numbers", "N"),
+    Flag("--body", "body", "NAME", "spec"),
+    Flag("--param", "params", "K=V", "pairs", "a parameter of the agent"),
+    Flag("--rate-hz", "rate_hz", "N"),
+    Flag("--watchdog-s", "watchdog_s", "S"),
+    Flag("--max-linear-mps", "max_linear_mps", "V"),
+    Flag("--max-angular-radps", "max_angular_radps", "W"),
+    Flag("--tracker", "tracker", kind="true"),
+    Flag("--listen", "network.listen", "ENDPOINT", "list", "endpoint for other robots: tcp/127.0.0.1:7547"),
+    Flag("--connect", "network.connect", "ENDPOINT", "list", "endpoint to connect to: tcp/127.0.0.1:7548"),
+    Flag("--multicast", "network.multicast", kind="true", text="discover robots in the local network"),
+    Flag("--ca", "network.ca", "FILE", "path", "certificate of the authority that signed all others"),
+    Flag("--certificate", "network.certificate", "FILE", "path", "the robot's certificate"),
+    Flag("--key", "network.key", "FILE", "path", "private key of the certificate"),
+    Flag("--insecure", "network.insecure", kind="true", text="connect beyond this machine without certificates"),
+    Flag("--log", "log", "FOLDER", "path"),
+    Flag("--pace", "pace", "X"),
+    Flag("--seed", "seed", "N"),
 )
 
 DRIVER_FLAGS = ("--driver", "--address", "--option", "--name", "--body")  # sufficient to stop the motors
