@@ -3,18 +3,18 @@
 import math
 from collections.abc import Sequence
 
-UNKNOWN_TEXT = "–"  # in place of a number
+UNKNOWN_TEXT = "–"  # text of a missing number
 _NO_DECIMALS = 1000.0  # least number that is written without decimals
 
 
 def json_number(number: float) -> float | None:
-    """A Python float, or None for what is not a number: undefined, or nothing to measure."""
+    """Return a Python float, or None for NaN, which JSON lacks."""
     value = float(number)
     return None if math.isnan(value) else value
 
 
 def number(value: float | None) -> str:
-    """A number on a page: three significant digits, commas from a thousand on, a true minus; a dash if undefined."""
+    """Write a number for a page: three significant digits, commas from a thousand on, a true minus; a dash for NaN."""
     if value is None or math.isnan(value):
         return UNKNOWN_TEXT
     if math.isinf(value):
@@ -23,7 +23,7 @@ def number(value: float | None) -> str:
 
 
 def number_text(value: float, sign: bool = False) -> str:
-    """A number in a table of a terminal or a CSV file: three significant digits, or all before its point.
+    """Write a number for a table of a terminal or a CSV file: three significant digits, or all before the point.
 
     >>> number_text(0.12345), number_text(12345.6), number_text(0.5, sign=True), number_text(-0.0)
     ('0.123', '12346', '+0.5', '0')
@@ -37,7 +37,7 @@ def number_text(value: float, sign: bool = False) -> str:
 
 
 def short(value: float, _tick: int = 0) -> str:
-    """A number beside an axis, as short as possible: k for thousands, M for millions (a formatter of ticks)."""
+    """Write a number for an axis, as short as possible: k for thousands, M for millions (a formatter of ticks)."""
     for power, letter in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
         if abs(value) >= power:
             return f"{value / power:g}{letter}".replace("-", "−")
@@ -45,17 +45,17 @@ def short(value: float, _tick: int = 0) -> str:
 
 
 def share(value: float | None) -> str:
-    """A share in percent."""
+    """Write a share in percent."""
     return UNKNOWN_TEXT if value is None or math.isnan(value) else f"{value:.1%}"
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
-    """`1 run`, `1,200 runs`."""
+    """Write a number and its noun, such as `1 run` or `1,200 runs`."""
     return f"{count:,} {noun if count == 1 else plural or noun + 's'}"
 
 
 def shortened(text: str, most: int) -> str:
-    """A text of at most so many letters; a longer one ends in an ellipsis.
+    """Cut a text to at most `most` letters; a longer text ends in an ellipsis.
 
     >>> shortened("kinematic", 9), shortened("kinematic", 5)
     ('kinematic', 'kine…')
@@ -64,12 +64,12 @@ def shortened(text: str, most: int) -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """`a, b and c`."""
+    """Join words to a list such as `a, b and c`."""
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1]))) if words else ""
 
 
 def abbreviate(words: Sequence[str], most: int) -> str:
-    """The first words, and how many more there are.
+    """Join the first words, and the number of the others.
 
     >>> abbreviate(["a", "b", "c", "d"], 2), abbreviate(["a"], 2)
     ('a, b and 2 more', 'a')
@@ -78,7 +78,7 @@ def abbreviate(words: Sequence[str], most: int) -> str:
 
 
 def sentence(text: str) -> str:
-    """The text with a capital letter at its start."""
+    """Return the text with a capital letter at its start."""
     return text[:1].upper() + text[1:]
 
 

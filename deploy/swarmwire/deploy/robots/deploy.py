@@ -147,7 +147,7 @@ class _Deployment:
 
 
 def _check_free_space(session: HostSession, archives: Sequence[Archive]) -> None:
-    """HostFailed if the host lacks the space to unpack these archives."""
+    """Raise HostFailed if the host lacks the space to unpack these archives."""
     free = session.facts.free_bytes
     needed = round(FREE_SPACE_FACTOR * sum(archive.unpacked for archive in archives)) + SPARE_BYTES
     if free < needed:

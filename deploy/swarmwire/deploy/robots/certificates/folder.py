@@ -78,7 +78,7 @@ def revoke(folder: Path, name: str, clock: DatedClock) -> None:
 
 
 def _check(register: Register, name: str, now: datetime, *, renew: bool) -> None:
-    """BadInput if the name may not get a certificate now."""
+    """Raise BadInput if the name may not get a certificate now."""
     last = register.last(name)
     names = (issued.name for issued in register.certificates)
     other = next((other for other in names if other != name and other.lower() == name.lower()), None)

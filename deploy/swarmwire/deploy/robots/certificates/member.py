@@ -39,7 +39,7 @@ class MemberCredentials:
     access: RunAccess | None
 
     def check(self, option: str, *endpoints: str) -> None:
-        """BadInput about an option of the command line unless this member may use all its endpoints."""
+        """Raise BadInput about an option of the command line unless this member may use all its endpoints."""
         try:
             for endpoint in endpoints:
                 self.network.check_endpoint(endpoint, "", option)
