@@ -167,7 +167,7 @@ def refusal(error: BaseException) -> str | None:
     return None
 
 
-def program(name: str = "swarmwire") -> Path:
+def command_path(name: str = "swarmwire") -> Path:
     """Return the path of a program of swarmwire as users can type it; with `uv run` it is not on their path."""
     present = Path(sys.argv[0])
     path = present.with_name(name)

@@ -17,7 +17,7 @@ from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.wire.observer_frames import encode_truth
 from swarmwire.comms.wire.sessions import open_observer, open_runner, unix_endpoint
 from swarmwire.deploy import run
-from swarmwire.deploy.live.following import RunGone, following
+from swarmwire.deploy.live.subscription import RunGone, subscribe
 from swarmwire.deploy.runs import backends, published
 from swarmwire.deploy.runs.live_address import Live, read_live, write_live
 from swarmwire.deploy.runs.published import Published
@@ -74,7 +74,7 @@ def test_observer_gets_scene_ticks_and_metrics(tmp_path, every_tick):
     of = static(4, lights=[[]])
     metrics, observer = publish(tmp_path, of)
     try:
-        with following(read_live(tmp_path)) as seen:
+        with subscribe(read_live(tmp_path)) as seen:
             assert seen.scene.static == of
             assert [series.name for series in seen.metrics] == [metric.name for metric in metrics.metrics]
             until(observer._find_viewer)
@@ -101,7 +101,7 @@ def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tm
     of, clock = static(2), StillClock()
     metrics, observer = publish(tmp_path, of, clock)
     try:
-        with following(read_live(tmp_path)) as seen:
+        with subscribe(read_live(tmp_path)) as seen:
             until(observer._find_viewer)
             glimpses = []
             for tick in range(100):  # a hundredth of a second each
@@ -128,7 +128,7 @@ def test_ticks_that_find_the_sender_busy_are_left_out_and_counted(tmp_path, monk
     monkeypatch.setattr(published, "encode_truth", lambda glimpse: go.wait() and encode_truth(glimpse))
     metrics, observer = publish(tmp_path, of)
     try:
-        with following(read_live(tmp_path)) as seen:
+        with subscribe(read_live(tmp_path)) as seen:
             until(observer._find_viewer)
             for tick in range(20):
                 metrics.see(now := truth(of, tick, tally=tally({Fate.RECEIVED: 1})))
@@ -151,7 +151,7 @@ def test_error_of_the_sender_ends_the_publishing_not_the_run(tmp_path, monkeypat
     monkeypatch.setattr(published, "encode_truth", lambda _: 1 / 0)
     metrics, observer = publish(tmp_path, of := static(2))
     try:
-        with following(read_live(tmp_path)):
+        with subscribe(read_live(tmp_path)):
             until(observer._find_viewer)
             metrics.see(truth(of))
             observer.see(truth(of))
@@ -242,7 +242,7 @@ def test_live_file_of_a_killed_run_is_not_believed(tmp_path):
     write_live(Live("unixsock-stream//nowhere", "r", 2**22 + 1), tmp_path)  # more than Linux gives out
     assert read_live(tmp_path) is None
     write_live(Live(f"unixsock-stream/{tmp_path}/none", "r", os.getpid()), tmp_path)
-    with pytest.raises(RunGone, match="cannot be reached"), following(read_live(tmp_path)):
+    with pytest.raises(RunGone, match="cannot be reached"), subscribe(read_live(tmp_path)):
         pass
 
 
@@ -256,7 +256,7 @@ def test_paused_run_shows_its_newest_tick_to_each_new_observer(tmp_path):
 
     def pause():
         for _ in range(2):  # the second begins to look on in the middle, after the first has gone
-            with following(read_live(tmp_path)) as run:
+            with subscribe(read_live(tmp_path)) as run:
                 seen = until(lambda run=run: looked(run))
                 assert seen is not None
                 found.append(seen.truth.tick)

@@ -13,14 +13,14 @@ import pytest
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy import run
 from swarmwire.deploy.live import live_view, viewer
-from swarmwire.deploy.live.following import following
 from swarmwire.deploy.live.live_view import LiveView
 from swarmwire.deploy.live.page.web_viewer import viewer_code
+from swarmwire.deploy.live.subscription import subscribe
 from swarmwire.deploy.live.viewer import Drawer, Viewer, ViewOptions, readable, show_recording
 from swarmwire.deploy.runs.live_address import read_live
 from swarmwire.deploy.runs.published import Published
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.pictures.viewer.program import closed_environment, end, free_port, is_open, program
+from swarmwire.metrics.pictures.viewer.program import closed_environment, end, free_port, is_open, viewer_path
 from tests.support.clocks import until
 from tests.support.deploy.page import requested_hosts
 from tests.support.deploy.runs import LOSSY, At, called
@@ -176,7 +176,7 @@ def test_recording_without_an_end_is_completed_in_a_copy(folder, tmp_path):
     cut.write_bytes(whole_bytes[: len(whole_bytes) * 2 // 3])
     with readable(cut) as path:
         assert path != cut
-        verified = subprocess.run([program(), "rrd", "verify", path], capture_output=True, check=False)
+        verified = subprocess.run([viewer_path(), "rrd", "verify", path], capture_output=True, check=False)
         assert verified.returncode == 0, verified.stderr
         ticks = [c.to_record_batch() for c in rerun.chunk.RrdReader(str(path)).stream().filter(content="/world/robots")]
         assert sum(batch.num_rows for batch in ticks) > 10
@@ -249,7 +249,7 @@ def hub(drawn, folder):
     """What draws into a program of rerun that only writes down what it is sent: no graphics are needed."""
     port = free_port()
     with (folder / "log").open("wb") as log:
-        command = [program(), "--save", drawn, "--bind", "127.0.0.1", "--port", str(port)]
+        command = [viewer_path(), "--save", drawn, "--bind", "127.0.0.1", "--port", str(port)]
         process = subprocess.Popen(command, env=closed_environment(), stdout=log, stderr=log)
         try:
             until(lambda: is_open(port))
@@ -283,7 +283,7 @@ def test_published_run_is_drawn_in_the_viewer(tmp_path, viewer_for):
     with viewer_for(drawn, tmp_path) as target, held:
 
         def follow():
-            seen = held.enter_context(following(read_live(tmp_path)))
+            seen = held.enter_context(subscribe(read_live(tmp_path)))
             drawer = Drawer(seen, target, ViewOptions(clock, print, lambda: False))
             drawer.start()
             held.callback(drawer.join)

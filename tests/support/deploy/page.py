@@ -14,8 +14,8 @@ from urllib.parse import urlsplit
 import psutil
 import pytest
 
-from swarmwire.deploy.live.following import RunGone
 from swarmwire.deploy.live.remote_control import Refused
+from swarmwire.deploy.live.subscription import RunGone
 
 QUIET = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
          "--disable-background-networking", "--disable-component-update", "--disable-sync")  # fmt: skip

@@ -32,11 +32,11 @@ WATCHER = """
 import sys
 from pathlib import Path
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.deploy.live.following import following
+from swarmwire.deploy.live.subscription import subscribe
 from swarmwire.deploy.runs.live_address import read_live
 
 clock, seen = WallClock(), 0
-with following(read_live(Path(sys.argv[1]))) as run:
+with subscribe(read_live(Path(sys.argv[1]))) as run:
     print("looking", flush=True)
     while not run.over:
         if run.next() is None:

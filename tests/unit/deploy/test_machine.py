@@ -20,7 +20,7 @@ from swarmwire.comms.base.clock import WallClock, to_ns
 from swarmwire.comms.wire.sessions import PRIVATE
 from swarmwire.deploy import machine as host
 from swarmwire.deploy.cli import app as cli
-from swarmwire.deploy.machine import KERNEL_CACHE, keep_kernels, program, refusal
+from swarmwire.deploy.machine import KERNEL_CACHE, command_path, keep_kernels, refusal
 from swarmwire.deploy.runs.compiling import COMPILING, report_compiling
 from swarmwire.deploy.runs.live_address import SOCKET, STALE_S, local_endpoint
 from tests.support.deploy.runs import called
@@ -191,4 +191,4 @@ def test_program_name_as_printed_can_be_typed(tmp_path, monkeypatch, called, nam
         (tmp_path / folder / "swarmwire-agent").touch()
     monkeypatch.chdir(tmp_path / "here")
     monkeypatch.setattr(sys, "argv", [str(tmp_path / called)])
-    assert str(program(name)) == typed.format(root=tmp_path)
+    assert str(command_path(name)) == typed.format(root=tmp_path)

@@ -11,7 +11,7 @@ from swarmwire.comms.wire.control_frames import ControlRequest, decode_reply, en
 from swarmwire.comms.wire.keys import ObserverKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.sessions import closed_after, open_observer
-from swarmwire.deploy.live.following import RunGone
+from swarmwire.deploy.live.subscription import RunGone
 
 ANY_PUBLISHED = ObserverKeys("*").published
 ANSWER_TIMEOUT_S = 10.0  # a run answers in milliseconds, unless its machine is very busy

@@ -18,7 +18,7 @@ from swarmwire.comms.base.clock import NS_PER_S, Clock
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.observe.run_views import ObservedTick
 from swarmwire.comms.radio.records import PacketCounts
-from swarmwire.deploy.live.following import Following, following
+from swarmwire.deploy.live.subscription import RunSubscription, subscribe
 from swarmwire.deploy.runs.live_address import Live
 from swarmwire.metrics.pictures.viewer.program import (
     closed_environment,
@@ -27,7 +27,7 @@ from swarmwire.metrics.pictures.viewer.program import (
     free_port,
     hidden_loopback,
     is_open,
-    program,
+    viewer_path,
 )
 from swarmwire.metrics.pictures.viewer.recording import RerunLive, Target
 from swarmwire.metrics.records.run_folder.verify import complete_frames_bytes
@@ -50,7 +50,7 @@ class Viewer:
     abandoned: Callable[[], bool] = lambda: False  # True if browsers showed it, and all have closed it
 
 
-class Departure:
+class AbandonmentDetector:
     """Detects that all readers have left for longer than a browser needs to reload a page."""
 
     def __init__(self, clock: Clock, readers: Callable[[], int]) -> None:
@@ -88,7 +88,7 @@ def rerun(
     listening = ["--bind", host, "--port", str(ports[0])]
     listening += ["--serve-web", "--web-viewer-port", str(ports[1])] if web else []
     with TemporaryFile() as log:  # without a name, so that no file remains if this process is killed
-        command = ending_with_this([str(program()), *listening, *options])
+        command = ending_with_this([str(viewer_path()), *listening, *options])
         environment = {**closed_environment(), "RUST_LOG": "warn"}
         process = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
         try:
@@ -128,7 +128,7 @@ def readable(recording: Path) -> Generator[Path]:
     with TemporaryDirectory(prefix="swarmwire-view-") as directory:
         copy = Path(directory, recording.name)
         repair = subprocess.run(
-            [program(), "rrd", "optimize", recording, "-o", copy],
+            [viewer_path(), "rrd", "optimize", recording, "-o", copy],
             env=closed_environment(),
             capture_output=True,
             text=True,
@@ -177,7 +177,7 @@ def show_live(live: Live, options: ViewOptions) -> None:
 
     RunGone if the run does not answer.
     """
-    with following(live) as run, options.viewer(None) as viewer:
+    with subscribe(live) as run, options.viewer(None) as viewer:
         _report_address(viewer, options)
         drawer = Drawer(run, viewer.target, options)
         drawer.start()
@@ -201,7 +201,11 @@ class Drawer(threading.Thread):
     """
 
     def __init__(
-        self, run: Following, target: Target, options: ViewOptions, page: Callable[[ObservedTick], None] | None = None
+        self,
+        run: RunSubscription,
+        target: Target,
+        options: ViewOptions,
+        page: Callable[[ObservedTick], None] | None = None,
     ) -> None:
         """Draw into this target; `page` is called with each tick before."""
         super().__init__(name="drawer", daemon=True)
@@ -252,5 +256,5 @@ def _report_address(viewer: Viewer, options: ViewOptions) -> None:
         options.report(f"open {viewer.address} in a browser; Ctrl-C ends the view")
 
 
-def _missed(run: Following) -> str:
+def _missed(run: RunSubscription) -> str:
     return f" ({run.lost} frames did not arrive in time)" if run.lost else ""

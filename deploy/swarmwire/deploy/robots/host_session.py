@@ -78,7 +78,7 @@ class HostSession:
     async def begin(self) -> None:
         """Send the server's program, and read the facts of the host."""
         with suppress(BrokenPipeError, ConnectionError):  # without Python the shell's error follows below
-            self._process.stdin.write(program())
+            self._process.stdin.write(server_program())
         self.facts = await self._answer("start", HostFacts)
 
     def need_manager(self) -> None:
@@ -202,7 +202,7 @@ def start_command(python: str) -> str:
 
 
 @cache
-def program() -> bytes:
+def server_program() -> bytes:
     """Return the server as a zipapp, after a line with its length."""
     folder, parents = Path(__file__).parent / "host_side", PACKAGE.split(".")
     data = io.BytesIO()

@@ -16,8 +16,8 @@ from swarmwire.comms.wire.sessions import closed_after, listens_at, open_observe
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.live import remote_control
-from swarmwire.deploy.live.following import RunGone
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling, only_run_at
+from swarmwire.deploy.live.subscription import RunGone
 from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
 from swarmwire.deploy.robots.certificates.member import member
 from swarmwire.deploy.robots.certificates.register import certificate_request

@@ -17,11 +17,11 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.observe.run_views import ObservedTick
 from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.deploy.live.page.news import MAX_EVENTS, MAX_HISTORY, MAX_POSITIONS, NewsThread, Seen
+from swarmwire.deploy.live.page.news import MAX_EVENTS, MAX_HISTORY, MAX_POSITIONS, NewsThread, TickNumbers
 from swarmwire.deploy.live.page.server import FILES, PageConstants, page_app
 from swarmwire.deploy.live.page.serving import serving
 from swarmwire.deploy.live.page.web_viewer import PAGE
-from swarmwire.deploy.live.viewer import Departure
+from swarmwire.deploy.live.viewer import AbandonmentDetector
 from tests.support.clocks import FakeClock, until
 from tests.support.deploy.page import StandIn
 from tests.support.metrics.truths import static, tally, truth
@@ -300,7 +300,7 @@ def test_news_end_for_every_page_when_the_server_ends(control, news):
 
 def test_departure_is_that_of_the_last_browser_after_there_was_one():
     clock, readers = FakeClock(), [0]
-    departed = Departure(clock, lambda: readers[0])
+    departed = AbandonmentDetector(clock, lambda: readers[0])
 
     def looks(open_pages, for_s):
         readers[0] = open_pages
@@ -364,7 +364,7 @@ def happened(robots, ended=False):
 
 
 def test_centre_is_that_of_the_robots_alive():
-    seen = Seen(OF)
+    seen = TickNumbers(OF)
     assert seen.numbers["centre"] is None
     pose = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 4.0, 0.0], [9.0, 9.0, 0.0]])
     seen.see(glimpse(pose=pose, alive=np.array([True, True, True, False])))
@@ -376,13 +376,13 @@ def test_centre_is_that_of_the_robots_alive():
 
 def test_positions_shown_of_a_large_swarm_are_limited():
     large = static(robots=3 * MAX_POSITIONS)
-    seen = Seen(large)
+    seen = TickNumbers(large)
     seen.see(glimpse(of=large))
     assert len(seen.numbers["places"]) == MAX_POSITIONS
 
 
 def test_delivery_is_that_of_the_last_simulated_second():
-    seen = Seen(OF)
+    seen = TickNumbers(OF)
     seen.see(glimpse(0, tally=tally({Fate.RECEIVED: 1, Fate.LOST: 1})))
     assert seen.numbers["link_pdr"] == 0.5
     seen.see(glimpse(5, tally=tally({Fate.RECEIVED: 2})))
@@ -395,14 +395,14 @@ def test_delivery_is_that_of_the_last_simulated_second():
 
 @pytest.mark.parametrize(("robots", "told"), [((), "none"), ((1, 3), "flock-1, flock-3"), (range(4), "all")])
 def test_events_say_whom_they_changed_when_they_began(robots, told):
-    seen = Seen(OF)
+    seen = TickNumbers(OF)
     seen.see(glimpse(0, events=(happened(robots),)))
     seen.see(glimpse(1, events=(happened([0], ended=True),)))
     assert seen.numbers["who"] == {"2": told}
 
 
 def test_events_kept_are_the_newest():
-    seen = Seen(OF)
+    seen = TickNumbers(OF)
     for tick in range(MAX_EVENTS + 10):
         seen.see(glimpse(tick, events=(replace(happened([0]), serial=tick),)))
     assert list(seen.numbers["who"]) == [str(tick) for tick in range(10, MAX_EVENTS + 10)]
@@ -410,7 +410,7 @@ def test_events_kept_are_the_newest():
 
 def test_event_on_many_robots_names_five_and_counts_the_others():
     many = static(robots=9)
-    seen = Seen(many)
+    seen = TickNumbers(many)
     changed = np.ones(9, np.bool_)
     changed[0] = False
     event = replace(happened([]), changed=changed)

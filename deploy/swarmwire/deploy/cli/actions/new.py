@@ -8,7 +8,7 @@ from pathlib import Path
 from string import Template
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.machine import program
+from swarmwire.deploy.machine import command_path
 from swarmwire.deploy.terminal.output import echo
 
 SWARM_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
@@ -20,8 +20,8 @@ def create_swarm(name: str) -> None:
     created = new_swarm(name)
     folder = created[0].parent
     echo(f"made {folder}: {', '.join(path.name for path in created)}")
-    echo(f"run it:    {program()} run {folder}")
-    echo(f"check it:  {program()} check {folder}")
+    echo(f"run it:    {command_path()} run {folder}")
+    echo(f"check it:  {command_path()} check {folder}")
     echo(f"test it:   {sys.executable} -m pytest {folder}")
 
 

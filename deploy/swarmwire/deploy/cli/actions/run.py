@@ -21,7 +21,7 @@ from swarmwire.deploy.cli.display.report import print_result
 from swarmwire.deploy.cli.options import INTERRUPTED, leaving_when_hung_up
 from swarmwire.deploy.cli.run_options import GatewayOptions, OpenViews, PacketOptions, RunCommandOptions, StartOptions
 from swarmwire.deploy.live.live_view import LiveView, PageBeside
-from swarmwire.deploy.machine import program
+from swarmwire.deploy.machine import command_path
 from swarmwire.deploy.robots.certificates.member import member
 from swarmwire.deploy.runs.compiling import report_compiling
 from swarmwire.deploy.runs.config import Recording, RunConfig, choose_seeds, packet_share
@@ -117,8 +117,8 @@ def _finish(simulation: Simulation, console: Console) -> Result:
 def _print_next_steps(result: Result, folder: Path, console: Console) -> None:
     recorded = f" (the pictures of seed {result.arenas[0].seed})" if len(result.arenas) > 1 else ""
     console.print(f"written: {folder}{recorded}", soft_wrap=True)
-    console.print(f"look at it: {program()} view {folder}", soft_wrap=True)
-    console.print(f"as a film: {program()} export {folder} --to film.gif", soft_wrap=True)
+    console.print(f"look at it: {command_path()} view {folder}", soft_wrap=True)
+    console.print(f"as a film: {command_path()} export {folder} --to film.gif", soft_wrap=True)
 
 
 def _gateways(options: GatewayOptions, scenario: Scenario) -> Gateways | None:

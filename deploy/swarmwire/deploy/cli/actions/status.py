@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 from swarmwire.deploy.cli.actions.control import control_of
 from swarmwire.deploy.cli.options import RunChoice
-from swarmwire.deploy.live.following import RunGone
 from swarmwire.deploy.live.remote_control import controlling
+from swarmwire.deploy.live.subscription import RunGone
 from swarmwire.deploy.runs.live_address import find_run, live_runs
 from swarmwire.deploy.terminal.console import TerminalConsole, aligned, print_rows
 from swarmwire.deploy.terminal.output import echo

@@ -15,7 +15,7 @@ from swarmwire.deploy.campaigns.sweep import CAMPAIGNS, ExecutionOptions, begin_
 from swarmwire.deploy.cli.display.sweep import SweepProgress, print_sweep
 from swarmwire.deploy.cli.options import INTERRUPTED, leaving_when_hung_up
 from swarmwire.deploy.cli.sweep import SweepOptions
-from swarmwire.deploy.machine import program
+from swarmwire.deploy.machine import command_path
 from swarmwire.deploy.runs.config import SEEDS, seed_list
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.record.folder import stamped_folder
@@ -37,7 +37,7 @@ def run_sweep(options: SweepOptions) -> None:
         else:
             folder = options.out or stamped_folder(Path(CAMPAIGNS, options.source.stem))
             sweep = begin_sweep(plan, folder, shlex.join(["swarmwire", *sys.argv[1:]]), execution)
-    print_sweep(sweep, console, program())
+    print_sweep(sweep, console, command_path())
     if not sweep.is_over:
         raise typer.Exit(INTERRUPTED)
 

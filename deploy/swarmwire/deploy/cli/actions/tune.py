@@ -13,7 +13,7 @@ from swarmwire.deploy.cli.display.sweep import SweepProgress
 from swarmwire.deploy.cli.display.tune import TuneProgress, print_tuned
 from swarmwire.deploy.cli.options import INTERRUPTED, leaving_when_hung_up
 from swarmwire.deploy.cli.sweep import CHECK_SEEDS, PARALLEL_TRIALS, SAMPLER_SEED, TRIAL_SEEDS, TRIALS, TuneOptions
-from swarmwire.deploy.machine import program
+from swarmwire.deploy.machine import command_path
 from swarmwire.deploy.runs.config import seed_list
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.record.folder import stamped_folder
@@ -32,7 +32,7 @@ def tune_scenario(options: TuneOptions) -> None:
         else:
             _refuse_with_resume(options)
             tuned = resume_tune(options.resume, options.workers, observers, trials=options.trials, force=options.force)
-    print_tuned(tuned, console, program())
+    print_tuned(tuned, console, command_path())
     if not tuned.is_over:
         raise typer.Exit(INTERRUPTED)
 

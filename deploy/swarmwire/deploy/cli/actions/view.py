@@ -7,7 +7,7 @@ from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import UI
 from swarmwire.deploy.cli.options import standard_input_closed
-from swarmwire.deploy.live.following import RunGone
+from swarmwire.deploy.live.subscription import RunGone
 from swarmwire.deploy.live.viewer import ViewOptions, has_screen, show_live, show_recording
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.live_address import read_live

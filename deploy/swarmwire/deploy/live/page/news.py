@@ -157,7 +157,7 @@ MAX_EVENTS = 200  # the status has the same limit
 MAX_POSITIONS = 500  # robots on the small map
 
 
-class Seen:
+class TickNumbers:
     """The numbers of the latest tick. Written by the thread that draws, read by any other."""
 
     def __init__(self, static: Static) -> None:

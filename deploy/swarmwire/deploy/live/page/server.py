@@ -19,11 +19,11 @@ from starlette.types import ASGIApp
 from swarmwire.comms.base.config import check_plain
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.wire.network import Network
-from swarmwire.deploy.live.following import following
-from swarmwire.deploy.live.page.news import NewsThread, Seen, facts
-from swarmwire.deploy.live.page.serving import Door, serving
+from swarmwire.deploy.live.page.news import NewsThread, TickNumbers, facts
+from swarmwire.deploy.live.page.serving import RequestGuard, serving
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
-from swarmwire.deploy.live.viewer import Departure, Drawer, ViewOptions, has_screen
+from swarmwire.deploy.live.subscription import subscribe
+from swarmwire.deploy.live.viewer import AbandonmentDetector, Drawer, ViewOptions, has_screen
 from swarmwire.deploy.runs.live_address import Live
 
 MAX_STEPS = 100_000
@@ -37,9 +37,9 @@ def show_page(live: Live, options: ViewOptions, network: Network | None = None, 
     """
     clock = options.clock
     viewing = replace(options, web=True, port=None).viewer(None)
-    with following(live, network) as run, viewing as viewer, controlling(live.endpoint, live.run, network) as control:
+    with subscribe(live, network) as run, viewing as viewer, controlling(live.endpoint, live.run, network) as control:
         assert viewer.address is not None, "a viewer for browsers has an address"
-        seen = Seen(run.scene.static)
+        seen = TickNumbers(run.scene.static)
         drawer = Drawer(run, viewer.target, options, seen.see)
         drawer.start()
         constants = PageConstants(viewer.address, facts(run.scene))
@@ -58,7 +58,7 @@ def show_page(live: Live, options: ViewOptions, network: Network | None = None, 
                 webbrowser.open(address)
             if begin:
                 _first_tick(control)
-            departed = Departure(clock, lambda: news.readers)
+            departed = AbandonmentDetector(clock, lambda: news.readers)
             while not options.stopped() and drawer.fault is None:
                 abandoned = departed()
                 if run.over and abandoned:
@@ -194,4 +194,4 @@ def page_app(control: RemoteControl, news: NewsThread, constants: PageConstants,
 
     app.mount("/", StaticFiles(directory=FILES))
     origin = "/".join(constants.viewer.split("/")[:3])
-    return Door(app, token, port, f"script-src 'self'; frame-src {origin}; frame-ancestors 'none'")
+    return RequestGuard(app, token, port, f"script-src 'self'; frame-src {origin}; frame-ancestors 'none'")

@@ -74,7 +74,7 @@ NO_HOST = "refused: this page is served only to 127.0.0.1"
 NO_ORIGIN = "refused: request from another site"
 
 
-class Door:
+class RequestGuard:
     """Middleware that passes requests under /TOKEN/ on as requests for /, and protects responses from other sites.
 
     The token in the path is part of all relative links of the page, so the browser stores no cookie. The host name of a

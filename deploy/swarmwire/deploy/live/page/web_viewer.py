@@ -21,8 +21,8 @@ from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
 from swarmwire.comms.base.clock import Clock
-from swarmwire.deploy.live.page.serving import HOSTS, Door, serving
-from swarmwire.deploy.live.viewer import Departure, Viewer, rerun
+from swarmwire.deploy.live.page.serving import HOSTS, RequestGuard, serving
+from swarmwire.deploy.live.viewer import AbandonmentDetector, Viewer, rerun
 
 PAGE = Path(__file__).with_name("viewer")
 CODE = {"re_viewer.js": "text/javascript", "re_viewer_bg.wasm": "application/wasm"}  # media types by file
@@ -114,7 +114,7 @@ def web_viewer(clock: Clock, recording: Path | None, port: int | None = None) ->
         return viewer_app(code, recording or live, token, port)
 
     with serving(app, clock, port) as address, closing(live):
-        yield Viewer(live.write, address, lambda: True, Departure(clock, lambda: live.readers))
+        yield Viewer(live.write, address, lambda: True, AbandonmentDetector(clock, lambda: live.readers))
 
 
 def viewer_code(clock: Clock) -> dict[str, bytes]:
@@ -144,4 +144,4 @@ def viewer_app(code: Mapping[str, bytes], shown: Path | GrowingRecording, token:
 
     files = [Route(f"/{name}", viewer_file) for name in code]
     page = Mount("/", StaticFiles(directory=PAGE, html=True))
-    return Door(Starlette(routes=[Route("/run.rrd", recording), *files, page]), token, port, POLICY)
+    return RequestGuard(Starlette(routes=[Route("/run.rrd", recording), *files, page]), token, port, POLICY)

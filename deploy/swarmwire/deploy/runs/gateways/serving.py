@@ -15,7 +15,7 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
-from swarmwire.deploy.machine import program
+from swarmwire.deploy.machine import command_path
 from swarmwire.deploy.runs.gateways.gateways import (
     NETWORK_FIELD,
     GatewayChoice,
@@ -47,7 +47,7 @@ class ServedRobot:
         """The shell command that drives the robot; None without a run folder."""
         if self.file is None:
             return None
-        return f"{quote(str(program('swarmwire-agent')))} run --config {quote(str(self.file))}"
+        return f"{quote(str(command_path('swarmwire-agent')))} run --config {quote(str(self.file))}"
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ CLOSED_PROXY = "http://127.0.0.1:9"  # the discard port, without a listener
 LOOPBACK = "127.0.0.1"
 
 
-def program() -> Path:
+def viewer_path() -> Path:
     """Return the path of the viewer. `rerun` on the PATH is a wrapper; ending it would not end the viewer."""
     import rerun_cli
 

@@ -13,7 +13,7 @@ from swarmwire.comms.base.atomic import output_file
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.base.extras import VIEW
-from swarmwire.metrics.pictures.viewer.program import closed_environment, end, free_port, hidden_loopback, program
+from swarmwire.metrics.pictures.viewer.program import closed_environment, end, free_port, hidden_loopback, viewer_path
 
 TIMEOUT_NS = 60 * NS_PER_S  # limit of each wait for the viewer
 _PAUSE_NS = NS_PER_S // 20
@@ -124,7 +124,7 @@ def _viewer(rrd: Path, size: tuple[int, int]) -> Generator[_Viewer]:
     with TemporaryDirectory(prefix="swarmwire-picture-") as home:
         log = Path(home, "log")
         with log.open("wb") as out:
-            process = subprocess.Popen([program(), *options, rrd], env=_environment(home), stdout=out, stderr=out)
+            process = subprocess.Popen([viewer_path(), *options, rrd], env=_environment(home), stdout=out, stderr=out)
         try:
             yield _Viewer(process, f"rerun+http://{host}:{port}/proxy", log)
         finally:

@@ -27,7 +27,7 @@ class RunGone(SwarmwireError):
     """The run does not answer: it has ended or hangs."""
 
 
-class Following:
+class RunSubscription:
     """A subscriber of a run: its scene, its ticks as they arrive, the values of its metrics, and its end."""
 
     def __init__(
@@ -70,7 +70,7 @@ Frames = zenoh.handlers.Handler[zenoh.Sample]
 
 
 @contextmanager
-def following(live: Live, network: Network | None = None) -> Generator[Following]:
+def subscribe(live: Live, network: Network | None = None) -> Generator[RunSubscription]:
     """Subscribe to a run until the end of the block; RunGone if it does not answer.
 
     `network` has the certificates for an endpoint on another machine.
@@ -87,7 +87,7 @@ def following(live: Live, network: Network | None = None) -> Generator[Following
         # The run publishes nothing before it has a subscriber, so the scene comes first.
         scene = _scene(session, keys)
         frames = session.declare_subscriber(keys.truth, zenoh.handlers.RingChannel(MAX_WAITING))
-        yield Following(scene, frames, token)
+        yield RunSubscription(scene, frames, token)
 
 
 def _scene(session: zenoh.Session, keys: ObserverKeys) -> ObservedRun:
