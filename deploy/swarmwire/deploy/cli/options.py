@@ -61,8 +61,8 @@ def _instance(kind: type[OptionsT], values: Mapping[str, Any]) -> OptionsT:
     )
 
 
-def scenario_file(path: Path | None) -> Path | None:
-    """Return the file of a scenario, which may be in a swarm's folder; None without a path."""
+def resolve_scenario(path: Path | None) -> Path | None:
+    """Return the file of a scenario, also for a swarm's folder; None without a path."""
     if path is None:
         return None
     from swarmwire.comms.base.config import scenario_path
@@ -73,7 +73,7 @@ def scenario_file(path: Path | None) -> Path | None:
 ScenarioFile = Annotated[
     Path,
     typer.Argument(
-        help="The scenario, a TOML file, or a folder with scenario.toml.", metavar="SCENARIO", callback=scenario_file
+        help="The scenario, a TOML file, or a folder with scenario.toml.", metavar="SCENARIO", callback=resolve_scenario
     ),
 ]
 FleetFile = Annotated[Path, typer.Argument(help="The fleet, a TOML file.", metavar="FLEET")]

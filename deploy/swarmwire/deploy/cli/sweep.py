@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from swarmwire.comms.base.extras import TUNE
-from swarmwire.deploy.cli.options import Overrides, Quiet, scenario_file, with_options
+from swarmwire.deploy.cli.options import Overrides, Quiet, resolve_scenario, with_options
 
 TRIALS, TRIAL_SEEDS, CHECK_SEEDS = 100, "20", "50"
 PARALLEL_TRIALS, SAMPLER_SEED = 4, 1
@@ -24,7 +24,7 @@ class SweepOptions:
     source: Annotated[
         Path | None,
         typer.Argument(
-            help="The scenario, or a campaign: a TOML file.", metavar="SCENARIO|CAMPAIGN", callback=scenario_file
+            help="The scenario, or a campaign: a TOML file.", metavar="SCENARIO|CAMPAIGN", callback=resolve_scenario
         ),
     ] = None
     vary: Annotated[
@@ -92,7 +92,7 @@ class TuneOptions:
     """Options of `swarmwire tune`."""
 
     scenario: Annotated[
-        Path | None, typer.Argument(help="The scenario, a TOML file.", metavar="SCENARIO", callback=scenario_file)
+        Path | None, typer.Argument(help="The scenario, a TOML file.", metavar="SCENARIO", callback=resolve_scenario)
     ] = None
     search: Annotated[
         list[str] | None,

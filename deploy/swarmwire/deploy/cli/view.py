@@ -44,6 +44,6 @@ def ui_command(
     """
     UI.need("ui")
     VIEW.need("ui")
-    from swarmwire.deploy.cli.actions.page import open_page
+    from swarmwire.deploy.cli.actions.view import open_page
 
     open_page(RunChoice(run, endpoint, certs, name, insecure), port=port, with_parent=with_parent)

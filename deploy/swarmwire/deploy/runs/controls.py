@@ -118,9 +118,11 @@ class Controls:
         """Return True if the run is paused, and the time until the next tick may begin."""
         with self._lock:
             if self.paused:
-                self._is_between_ticks = not self._steps
-                self._steps -= not self._is_between_ticks
-                return self._is_between_ticks, POLL_NS * self._is_between_ticks
+                self._is_between_ticks = self._steps == 0
+                if self._is_between_ticks:
+                    return True, POLL_NS
+                self._steps -= 1
+                return False, 0
             self._is_between_ticks = False
             return False, 0 if self._pace or self.speed is None else self._next_ns - now_ns
 

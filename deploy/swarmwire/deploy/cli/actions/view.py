@@ -1,4 +1,4 @@
-"""`swarmwire view`: a run in rerun's viewer."""
+"""`swarmwire view` and `ui`: a run in rerun's viewer, and the page of a live run."""
 
 import os
 from pathlib import Path
@@ -6,13 +6,17 @@ from pathlib import Path
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import UI
-from swarmwire.deploy.cli.options import standard_input_closed
+from swarmwire.deploy.cli.actions.control import operator_network
+from swarmwire.deploy.cli.options import RunChoice, standard_input_closed
+from swarmwire.deploy.live.remote_control import only_run_at
 from swarmwire.deploy.live.subscription import RunGone
 from swarmwire.deploy.live.viewer import ViewOptions, has_screen, show_live, show_recording
 from swarmwire.deploy.runs.controls import Interrupt
-from swarmwire.deploy.runs.live_address import read_live
+from swarmwire.deploy.runs.live_address import Live, find_run, read_live
 from swarmwire.deploy.terminal.output import echo
 from swarmwire.metrics.records.run_folder.layout import RECORDING
+
+NO_PROCESS = 0  # process id of a run on another machine
 
 
 def view_run(run: Path, *, web: bool, port: int | None, with_parent: bool) -> None:
@@ -22,6 +26,19 @@ def view_run(run: Path, *, web: bool, port: int | None, with_parent: bool) -> No
         UI.need("view --web")
     with Interrupt() as interrupt:
         _show(run, view_options(interrupt, web=in_browser, port=port, with_parent=with_parent))
+
+
+def open_page(choice: RunChoice, *, port: int | None, with_parent: bool) -> None:
+    """Serve the page of a live run until it is over and closed."""
+    from swarmwire.deploy.live.page.server import show_page  # needs the extra [ui]
+
+    network = operator_network(choice)
+    if choice.endpoint is None:
+        live: Live = find_run(choice.run)
+    else:
+        live = Live(choice.endpoint, choice.run or only_run_at(choice.endpoint, network), NO_PROCESS)
+    with Interrupt() as interrupt:
+        show_page(live, view_options(interrupt, port=port, with_parent=with_parent), network, begin=with_parent)
 
 
 def view_options(interrupt: Interrupt, *, with_parent: bool, web: bool = False, port: int | None = None) -> ViewOptions:

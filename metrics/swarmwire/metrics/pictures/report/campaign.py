@@ -8,8 +8,7 @@ from swarmwire.metrics.pictures.report.campaign_overview import DISTRIBUTIONS, S
 from swarmwire.metrics.pictures.report.campaign_summary import SUMMARY
 from swarmwire.metrics.pictures.report.campaign_survival import SURVIVAL
 from swarmwire.metrics.pictures.report.campaign_transitions import TRANSITIONS
-from swarmwire.metrics.pictures.report.page import Report, Section
-from swarmwire.metrics.pictures.report.sections import ReportSection, build_sections
+from swarmwire.metrics.pictures.report.page import Report, ReportSection, Section, build_sections
 from swarmwire.metrics.records.campaign.campaign_json import FAILED
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.statistics.bootstrap import MIN_RESAMPLES, RESAMPLES

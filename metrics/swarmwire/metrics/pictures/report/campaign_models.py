@@ -19,8 +19,7 @@ from swarmwire.metrics.pictures.report.campaign_data import (
     response_title,
     rounding_of,
 )
-from swarmwire.metrics.pictures.report.page import Figure, Part, ReportTable, drawn_figure
-from swarmwire.metrics.pictures.report.sections import ReportSection
+from swarmwire.metrics.pictures.report.page import Figure, Part, ReportSection, ReportTable, drawn_figure
 from swarmwire.metrics.records.campaign.campaign_json import Response
 from swarmwire.metrics.statistics.sample import Interval, SeedTable
 from swarmwire.metrics.statistics.scaling import ScaledTimes, scaling_of_times

@@ -15,8 +15,7 @@ from swarmwire.metrics.pictures.report.campaign_data import (
     short_value,
 )
 from swarmwire.metrics.pictures.report.charts import MAX_POINTS, GroupValues, distributions
-from swarmwire.metrics.pictures.report.page import Figure, Listing, Part, ReportTable, drawn_figure
-from swarmwire.metrics.pictures.report.sections import ReportSection
+from swarmwire.metrics.pictures.report.page import Figure, Listing, Part, ReportSection, ReportTable, drawn_figure
 from swarmwire.metrics.records.campaign.campaign_json import FAILED, Campaign, Response, Value
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.text import counted, listed, sentence, shortened

@@ -12,8 +12,7 @@ from swarmwire.metrics.pictures.report.campaign_data import (
     rounding_of,
     short_value,
 )
-from swarmwire.metrics.pictures.report.page import Part, ReportTable
-from swarmwire.metrics.pictures.report.sections import ReportSection
+from swarmwire.metrics.pictures.report.page import Part, ReportSection, ReportTable
 from swarmwire.metrics.records.campaign.campaign_json import Response
 from swarmwire.metrics.statistics.summary import Summary
 from swarmwire.metrics.text import listed, number_text, sentence

@@ -17,8 +17,7 @@ from swarmwire.metrics.pictures.report.axes import (
     set_share_limits,
 )
 from swarmwire.metrics.pictures.report.campaign_data import CampaignData, Levels, Samples, figure_name, response_title
-from swarmwire.metrics.pictures.report.page import Figure, Part, drawn_figure
-from swarmwire.metrics.pictures.report.sections import ReportSection
+from swarmwire.metrics.pictures.report.page import Figure, Part, ReportSection, drawn_figure
 from swarmwire.metrics.records.campaign.campaign_json import Response
 from swarmwire.metrics.statistics.bootstrap import binomial_interval, bootstrapped_mean, percentile_interval
 from swarmwire.metrics.statistics.sample import Interval, Sample

@@ -17,8 +17,7 @@ from swarmwire.metrics.pictures.report.campaign_data import (
     slices_without,
 )
 from swarmwire.metrics.pictures.report.charts import HeatMap, Jump, MedianLine, heat_map, response_curve
-from swarmwire.metrics.pictures.report.page import Figure, Part, ReportTable, drawn_figure
-from swarmwire.metrics.pictures.report.sections import ReportSection
+from swarmwire.metrics.pictures.report.page import Figure, Part, ReportSection, ReportTable, drawn_figure
 from swarmwire.metrics.records.campaign.campaign_json import Response
 from swarmwire.metrics.statistics.summary import interval_text
 from swarmwire.metrics.statistics.trends import ChangePoint, change_point

@@ -1,18 +1,20 @@
-"""The parts of a report, and its HTML page, which needs no network, script or font."""
+"""The parts of a report, its kinds of sections, and its HTML page, which needs no network, script or font."""
 
 import io
 import re
 from base64 import b64encode
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Generic, TypeVar, cast
 
 from swarmwire.comms.base.atomic import check_output_path, make_subfolder, output_file
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import REPORT
 from swarmwire.metrics.pictures.drawing.canvas import LONG_SIDE_IN, new_figure
+
+Data = TypeVar("Data")
 
 COLUMN_IN = 3.4  # width of a figure, equal to a column of a paper; a page shows two side by side
 _DPI_SIZE_PX = 1280  # resolution of rasterized artists
@@ -73,6 +75,27 @@ class Report:
     def figures(self) -> tuple[Figure, ...]:
         """All figures, in order."""
         return tuple(part for section in self.sections for part in section.parts if isinstance(part, Figure))
+
+
+@dataclass(frozen=True)
+class ReportSection(Generic[Data]):
+    """A section that reports may have; a new one is such an object and an entry in `SECTIONS` of its report."""
+
+    title: str
+    parts: Callable[[Data], Sequence[Part]]  # no parts: the report omits the section
+    methods: tuple[str, ...] = ()  # paragraphs on its statistics, for the section Methods
+
+
+def build_sections(kinds: Iterable[ReportSection[Data]], data: Data) -> tuple[tuple[Section, ...], tuple[str, ...]]:
+    """Return the sections that have parts, and their paragraphs on methods."""
+    sections: list[Section] = []
+    methods: list[str] = []
+    for kind in kinds:
+        parts = tuple(kind.parts(data))
+        if parts:
+            sections.append(Section(kind.title, parts))
+            methods += kind.methods
+    return tuple(sections), tuple(methods)
 
 
 def blank_figure(width_in: float, height_in: float) -> Any:

@@ -11,11 +11,10 @@ from swarmwire.comms.observe.truth import Static
 from swarmwire.metrics.measures.registry import LINK_PDR
 from swarmwire.metrics.pictures.drawing.film import Film
 from swarmwire.metrics.pictures.drawing.metrics_strip import info_of, is_count
-from swarmwire.metrics.pictures.report.page import Listing, Part, Report, ReportTable
+from swarmwire.metrics.pictures.report.page import Listing, Part, Report, ReportSection, ReportTable, build_sections
 from swarmwire.metrics.pictures.report.run_data import RunData, read_run
 from swarmwire.metrics.pictures.report.run_radio import RADIO, REAL_TIME
 from swarmwire.metrics.pictures.report.run_timeline import EVENTS
-from swarmwire.metrics.pictures.report.sections import ReportSection, build_sections
 from swarmwire.metrics.records.run_folder.layout import MetricInfo
 from swarmwire.metrics.text import counted, number, share
 

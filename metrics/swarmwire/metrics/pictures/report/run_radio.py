@@ -19,13 +19,13 @@ from swarmwire.metrics.pictures.report.page import (
     Figure,
     Listing,
     Part,
+    ReportSection,
     ReportTable,
     blank_figure,
     drawn_figure,
 )
 from swarmwire.metrics.pictures.report.run_data import RunData
 from swarmwire.metrics.pictures.report.run_links import links
-from swarmwire.metrics.pictures.report.sections import ReportSection
 from swarmwire.metrics.text import counted, number, share, short
 
 _LATENCIES = {"latency_air_s": "on air", "latency_agent_s": "to the agent"}

@@ -11,10 +11,16 @@ from swarmwire.metrics.measures.registry import LINK_PDR, METRICS
 from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, GRID, INK, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.pictures.drawing.film import Film
 from swarmwire.metrics.pictures.drawing.metrics_strip import UNKNOWN, Facts, info_of, is_count, limits, titled
-from swarmwire.metrics.pictures.report.page import COLUMN_IN, Part, ReportTable, blank_figure, drawn_figure
+from swarmwire.metrics.pictures.report.page import (
+    COLUMN_IN,
+    Part,
+    ReportSection,
+    ReportTable,
+    blank_figure,
+    drawn_figure,
+)
 from swarmwire.metrics.pictures.report.run_data import ARENA, Lane, RunData, Span, event_kind, thinned
 from swarmwire.metrics.pictures.report.run_paths import path_figure
-from swarmwire.metrics.pictures.report.sections import ReportSection
 from swarmwire.metrics.text import number, short
 
 LANE_IN = 0.29  # height of a lane
