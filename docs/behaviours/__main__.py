@@ -9,8 +9,7 @@ from docs.behaviours.degradation import degradation_of
 from docs.behaviours.shown import HERE, draw_picture, find_shown, names
 from docs.experiments.making import draw, run, run_app
 from swarmwire.deploy.campaigns.sweep import ExecutionOptions
-from swarmwire.deploy.cli.catalogue.docstrings import flowing
-from swarmwire.deploy.terminal.output import echo
+from swarmwire.deploy.terminal.output import echo, flowing
 
 ABOUT = """The pages in docs/behaviours: a picture of each behaviour, and its performance under loss and latency.
 

@@ -9,8 +9,7 @@ from rich.console import Console
 from docs.experiments.experiment import HERE, find_experiment, names
 from docs.experiments.making import digest, draw, run, run_app
 from swarmwire.deploy.campaigns.sweep import ExecutionOptions
-from swarmwire.deploy.cli.catalogue.docstrings import flowing
-from swarmwire.deploy.terminal.output import echo
+from swarmwire.deploy.terminal.output import echo, flowing
 
 ABOUT = """The experiments in docs/experiments: campaigns, and what is drawn and told of them.
 

@@ -46,10 +46,7 @@ def loaded_by(calls: str) -> set[str]:
 def test_help_of_the_program_loads_no_command():
     modules = loaded_by('call("--help")')
     commands = {name for name in modules if name.startswith("swarmwire.deploy.cli.")}
-    assert commands == {
-        f"swarmwire.deploy.cli.{name}"
-        for name in ("app", "catalogue", "catalogue.docstrings", "commands", "options", "program")
-    }
+    assert commands == {f"swarmwire.deploy.cli.{name}" for name in ("app", "commands", "options", "program")}
     assert not modules & {*SIMULATOR, "msgspec", "pydantic"}
 
 

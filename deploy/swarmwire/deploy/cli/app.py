@@ -16,11 +16,10 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 from typer.main import get_command, get_group
 
 from swarmwire.comms.base.errors import BadInput, Interrupted, SwarmwireError
-from swarmwire.deploy.cli.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.commands import COMMANDS, CommandEntry
 from swarmwire.deploy.cli.options import BAD_INPUT, FAILED, INTERRUPTED
 from swarmwire.deploy.machine import refusal
-from swarmwire.deploy.terminal.output import echo
+from swarmwire.deploy.terminal.output import echo, flowing
 
 ABOUT = "A distributed swarm emulator: one world, an emulated lossy radio, agents in processes of their own."
 BETWEEN_EXAMPLES = re.compile(r"^(  swarmwire .*)\n\n(?=  swarmwire )", re.MULTILINE)

@@ -4,8 +4,8 @@ from typing import Annotated
 
 import typer
 
-from swarmwire.deploy.cli.catalogue.docstrings import flowing
 from swarmwire.deploy.cli.options import AsJson, Certs, Endpoint, Insecure, Name, RunChoice
+from swarmwire.deploy.terminal.output import flowing
 
 HELP = flowing("""Watch and control running simulations: pause, step, speed, and events for their robots and radios.
 

@@ -15,7 +15,6 @@ from swarmwire.agent.drivers.driver import Driver, driver_names, load_driver
 from swarmwire.agent.parameters import REQUIRED, TYPES, Parameter, Parametrized, parameters_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import installed_points, resolve
-from swarmwire.deploy.cli.catalogue.docstrings import first_line, texts_of
 from swarmwire.deploy.cli.catalogue.schema import (
     CatalogueEntry,
     CatalogueParameter,
@@ -23,6 +22,7 @@ from swarmwire.deploy.cli.catalogue.schema import (
     parameters_of_dataclass,
     unit_of,
 )
+from swarmwire.deploy.terminal.output import first_line, texts_of
 from swarmwire.world.gateways.gateway import GROUP as GATEWAYS
 from swarmwire.world.gateways.gateway import Gateway, gateway_kind, gateway_names
 from swarmwire.world.scenario.schema import words_of_bounds

@@ -19,7 +19,6 @@ from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES, Ros2Names
 from swarmwire.comms.robot.packets import TxResult
 from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
 from swarmwire.comms.robot.sensors.sensor import Field, RangedSensorSpec, SensorSpec
-from swarmwire.deploy.cli.catalogue.docstrings import first_line, flowing
 from swarmwire.deploy.cli.catalogue.schema import (
     CatalogueEntry,
     CatalogueParameter,
@@ -27,6 +26,7 @@ from swarmwire.deploy.cli.catalogue.schema import (
     parameters_of_dataclass,
     unit_of,
 )
+from swarmwire.deploy.terminal.output import first_line, flowing
 from swarmwire.world.custom.actuators import custom_actuator
 from swarmwire.world.scenario.bodies import read_body
 from swarmwire.world.sensors.loading import custom_sensor

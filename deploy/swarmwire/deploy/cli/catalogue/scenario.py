@@ -19,7 +19,6 @@ from swarmwire.comms.radio.stages.chain import ORDER
 from swarmwire.comms.radio.stages.loss import FrameLoss
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.robot.packets import Fate
-from swarmwire.deploy.cli.catalogue.docstrings import first_line, flowing, texts_of
 from swarmwire.deploy.cli.catalogue.schema import (
     CatalogueEntry,
     CatalogueParameter,
@@ -28,6 +27,7 @@ from swarmwire.deploy.cli.catalogue.schema import (
     parameters_of_schema,
 )
 from swarmwire.deploy.runs.scenario_parts import radio_of
+from swarmwire.deploy.terminal.output import first_line, flowing, texts_of
 from swarmwire.metrics.measures.metric import Metric
 from swarmwire.metrics.measures.registry import ENTRY_POINT_GROUP, METRICS, PlugIn, plug_ins
 from swarmwire.world.engines.physics import ENGINES

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-from swarmwire.deploy.cli.catalogue.docstrings import first_line, flowing
+from swarmwire.deploy.terminal.output import first_line, flowing
 from swarmwire.world.scenario.schema import Node, forms, plain, table_of, words
 
 

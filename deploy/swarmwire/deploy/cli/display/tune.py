@@ -126,7 +126,9 @@ def print_tuned(tuned: Tuned, console: Console, program: Path) -> None:
     console.print(_parameters(tuned, tuned.best))
     console.print(_goal_table(tuned, tuned.best, tuned.check))
     statistic, difference, interval = gained(tuned.check, tuned.tuning.goal)
-    console.print(f"best less own on fresh seeds, {statistic}: {difference_text(difference, interval)}", markup=False)
+    console.print(
+        f"best minus scenario on fresh seeds, {statistic}: {difference_text(difference, interval)}", markup=False
+    )
     if tuned.tuning.goal.stat == "mean" and any(map(is_skewed, (tuned.check.baseline.value, tuned.check.best.value))):
         console.print(SKEWED_SAMPLE, markup=False, soft_wrap=True)
     for search in tuned.tuning.searches:
@@ -185,7 +187,7 @@ def _goal_table(tuned: Tuned, best: TuningTrial, check: FreshCheck) -> Table:
     table.add_column(f"{len(tuning.check_seeds)} fresh seeds", justify="right", overflow="fold")
     for name, before, sample in (
         ("best", statistic_text(best, tuning.goal), check.best),
-        ("the scenario's own", "", check.baseline),
+        ("the scenario", "", check.baseline),
     ):
         after = sample_text(sample, tuning.goal) + failed_text(sample.failed)
         table.add_row(name, Text(before), Text(after))
