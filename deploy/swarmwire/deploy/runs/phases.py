@@ -176,12 +176,12 @@ class PreparedRun:
             self.world,
             plan.new_medium(self.world, plan.config.threads),
             acting,
-            (),
-            plan.scenario.events,
-            stop_conditions,
-            self.live_events,
-            cast("TimedBackend", acting) if plan.recorded_subtick_s is not None else None,
-            interfaces.follow if interfaces else None,
+            observers=(),
+            events=plan.scenario.events,
+            stop_conditions=stop_conditions,
+            live_events=self.live_events,
+            timed=cast("TimedBackend", acting) if plan.recorded_subtick_s is not None else None,
+            external_events=interfaces.follow if interfaces else None,
         )
 
     def _has_external_actions(self, backend: AgentBackend, log: RunnerLog, tick: int) -> bool:
