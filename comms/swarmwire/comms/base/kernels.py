@@ -45,7 +45,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 PRIVATE_NAMES = {
     "Dispatcher": (
         *("_cache", "_compile_for_args", "_compiler", "add_overload"),
-        *("get_call_template", "get_overload", "overloads", "py_func"),
+        *("get_call_template", "get_overload", "overloads", "py_func", "targetoptions"),
     ),
     "FunctionCache": (
         *("_cache_file", "_cache_path", "_index_key", "_py_func", "flush", "load_overload", "save_overload"),
@@ -73,7 +73,8 @@ def njit(*, cache: bool = True, **options: Any) -> Callable[[F], F]:
             compiled._compile_for_args = partial(_compile_for_args, compiled)
             _redirect_calls(compiled, inner)
             if cache:
-                compiled._cache, inner._cache = _Cache(function), _Cache(function, is_inner=True)
+                compiled._cache = _Cache(function, options)
+                inner._cache = _Cache(function, options, is_inner=True)
         return cast("F", compiled)
 
     return decorate
@@ -162,10 +163,10 @@ class _Cache(FunctionCache):
 
     _has_digest = False
 
-    def __init__(self, function: Callable[..., Any], *, is_inner: bool = False) -> None:
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any], *, is_inner: bool = False) -> None:
         """`is_inner`: the version that compiled code calls, without the CPython wrapper."""
         super().__init__(function)
-        self._is_inner = is_inner
+        self._options, self._is_inner = options, is_inner
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the machine code for a signature; None if there is none that is up to date."""
@@ -206,7 +207,7 @@ class _Cache(FunctionCache):
         if not self._has_digest:
             self._has_digest = True
             file: Any = self._cache_file
-            file._source_stamp = file._source_stamp, digest_of(self._py_func)
+            file._source_stamp = file._source_stamp, repr(self._options), digest_of(self._py_func)
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return super()._index_key(sig, codegen), tuple(_tuple_fields(kind) for kind in sig), self._is_inner
@@ -244,7 +245,7 @@ def _direct_digest(function: Any) -> tuple[bytes, tuple[Any, ...]]:
 
     def add_value(name: str, value: Any) -> None:
         if isinstance(value, Dispatcher):
-            digest.update(name.encode())
+            digest.update(repr((name, value.targetoptions)).encode())
             used.append(value.py_func)
         elif isinstance(value, ModuleType):
             if value.__name__.partition(".")[0] not in FOREIGN:

@@ -112,6 +112,15 @@ def test_machine_code_is_compiled_again_after_a_change_elsewhere(modules, old, n
 
 
 @needs_compiler
+def test_machine_code_is_compiled_again_with_other_options_elsewhere(modules):
+    assert modules.imported().plain(1.0) == 113.0
+    modules.other = OTHER.replace("@kernel()", '@kernel(error_model="numpy")')
+    again = modules.imported()
+    assert again.plain(1.0) == 113.0
+    assert hits(again.plain) == 0
+
+
+@needs_compiler
 def test_machine_code_is_locked_between_index_and_code(modules, monkeypatch, tmp_path):
     written, write = [], IndexDataCacheFile._save_data
 
