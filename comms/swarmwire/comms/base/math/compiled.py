@@ -1,0 +1,108 @@
+"""The elementary functions of `math` as compiled scalar functions for use in kernels; equal to `math` bit for bit."""
+
+# pyright: basic
+
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math import BINARY, COMPILED, UNARY
+from swarmwire.comms.base.math.exponential import define_exponential
+from swarmwire.comms.base.math.huge_angles import TWO_OVER_PI_DIGITS, remainder_of_huge
+from swarmwire.comms.base.math.operations import Operations
+from swarmwire.comms.base.math.trigonometric import NEAR, define_trigonometric
+
+# Divisions by 0 return infinity: with a check for each, loops would not be vectorised.
+_formula = njit(error_model="numpy")
+_DIGITS = np.array(TWO_OVER_PI_DIGITS, np.int64)
+_MANTISSA, _HIDDEN = 0xFFFFFFFFFFFFF, 1 << 52
+_remainder_of_huge = _formula(remainder_of_huge)
+
+
+@_formula
+def _where(condition: Any, x: Any, y: Any):
+    return x if condition else y
+
+
+@_formula
+def _bits(x: Any):
+    return np.float64(x).view(np.int64)
+
+
+@_formula
+def _from_bits(pattern: Any):
+    return np.int64(pattern).view(np.float64)
+
+
+@_formula
+def _sqrt(x: Any):
+    return np.sqrt(x)
+
+
+@_formula
+def _reduce_huge(is_huge: Any, x: Any, result: Any):
+    if is_huge:
+        pattern = np.float64(abs(x)).view(np.int64)
+        r, low, quotient = _remainder_of_huge(pattern & _MANTISSA | _HIDDEN, (pattern >> 52) - 1075, _DIGITS)
+        return (-r, -low, -quotient) if x < 0.0 else (r, low, quotient)
+    return result
+
+
+_operations = Operations(_where, _bits, _from_bits, _sqrt, _reduce_huge, _formula)
+sin_cos, _near_sin, _near_cos, sin, cos, tan, atan, atan2, asin = define_trigonometric(_operations)
+exp, expm1, log, log1p, log10, log2, power, hypot, erfc = define_exponential(_operations)
+
+HALF_LOG_2_PI = 0.91893853320467274178
+STIRLING = 1.0 / 12.0, -1.0 / 360.0, 1.0 / 1260.0, -1.0 / 1680.0, 1.0 / 1188.0, -691.0 / 360360.0
+
+
+@_formula
+def log_gamma(x: float):
+    """Return the logarithm of the gamma function of a positive x, by Stirling's series from 10 on."""
+    product = 1.0
+    while x < 10.0:
+        product *= x
+        x += 1.0
+    z = 1.0 / (x * x)
+    series = STIRLING[5]
+    for k in range(4, -1, -1):
+        series = series * z + STIRLING[k]
+    return (x - 0.5) * log(x) - x + HALF_LOG_2_PI + series / x - log(product)
+
+
+def _unary_loop(function: Any) -> Any:
+    @_formula
+    def loop(x: Any, out: Any):
+        for i in range(len(x)):
+            out[i] = function(x[i])
+
+    return loop
+
+
+def _angle_loop(near_function: Any, function: Any) -> Any:
+    @_formula
+    def loop(x: Any, out: Any):
+        are_near = True
+        for i in range(len(x)):
+            out[i] = near_function(x[i])
+            are_near &= abs(x[i]) <= NEAR
+        if not are_near:
+            for i in range(len(x)):
+                out[i] = function(x[i])
+
+    return loop
+
+
+def _binary_loop(function: Any) -> Any:
+    @_formula
+    def loop(x: Any, y: Any, out: Any):
+        for i in range(len(x)):
+            out[i] = function(x[i], y[i])
+
+    return loop
+
+
+COMPILED.update({name: _unary_loop(globals()[name]) for name in UNARY})
+COMPILED.update({name: _binary_loop(globals()[name]) for name in BINARY})
+COMPILED["sin"], COMPILED["cos"] = _angle_loop(_near_sin, sin), _angle_loop(_near_cos, cos)
