@@ -5,13 +5,11 @@ Run it with a process per robot, from the project's root:
     mine=../examples/flocking_agent.py:MyFlocking
     uv run swarmwire run scenarios/flocking-lossy.toml --runners per-robot --set robots.flock.agent=$mine
 
-The arithmetic is that of `swarmwire.agent.behaviours:Flocking`, in numpy functions, so the swarm moves the same, bit
-for bit.
+The arithmetic is that of `swarmwire.agent.behaviours:Flocking`, in portable functions, so the swarm moves the same,
+bit for bit.
 """
 
-import numpy as np
-
-from swarmwire.agent import Agent, Message, Robot, f4
+from swarmwire.agent import Agent, Message, Robot, f4, portable
 
 
 class Heading(Message):
@@ -40,14 +38,14 @@ class MyFlocking(Agent):
         for packet in packets:
             pull = min((packet.range_m - self.separation_m) / self.separation_m, 1.0)
             turn = packet.message.heading_rad - heading
-            x += self.cohesion * (pull * np.cos(packet.bearing_rad)) + self.alignment * np.cos(turn)
-            y += self.cohesion * (pull * np.sin(packet.bearing_rad)) + self.alignment * np.sin(turn)
+            x += self.cohesion * (pull * portable.cos(packet.bearing_rad)) + self.alignment * portable.cos(turn)
+            y += self.cohesion * (pull * portable.sin(packet.bearing_rad)) + self.alignment * portable.sin(turn)
         neighbours = max(len(packets), 1)
 
         near_x, near_y = robot.proximity.vector_sum()
         x = self.forward + x / neighbours - self.avoidance * near_x
         y = y / neighbours - self.avoidance * near_y
 
-        angle = float(np.arctan2(y, x))
-        robot.drive(self.speed_mps * max(float(np.cos(angle)), 0.0), self.turn_gain_per_s * angle)
+        angle = portable.atan2(y, x)
+        robot.drive(self.speed_mps * max(portable.cos(angle), 0.0), self.turn_gain_per_s * angle)
         robot.radio.send(Heading(heading_rad=heading))

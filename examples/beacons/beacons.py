@@ -8,9 +8,7 @@ Proximity sensors see what is near, and nothing else: an e-puck2's reach 5 cm. B
 distance to one another: each packet brings range and bearing of its sender.
 """
 
-import numpy as np
-
-from swarmwire.agent import Agent, Message, Robot, parameter, u4
+from swarmwire.agent import Agent, Message, Robot, parameter, portable, u4
 
 
 class Beacon(Message):
@@ -37,7 +35,7 @@ class Beacons(Agent):
         x, y = robot.proximity.vector_sum() if robot.proximity.value.max() > self.near else (0.0, 0.0)
         for packet in robot.radio.received(Beacon):
             weight = max(1.0 - packet.range_m / self.apart_m, 0.0)
-            x, y = x + weight * np.cos(packet.bearing_rad), y + weight * np.sin(packet.bearing_rad)
+            x, y = x + weight * portable.cos(packet.bearing_rad), y + weight * portable.sin(packet.bearing_rad)
         if x <= 0.0:
             self.side = 0.0
         elif not self.side:  # kept until the way is free: in a corner the sides alternate

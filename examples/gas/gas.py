@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.world.custom import CustomActuator, CustomSensor, Field, Noise, Scene, parameter
 
@@ -43,8 +44,8 @@ class Gas(CustomSensor):
         self.leak = Leak.shared_in(self.scene)
 
     def truth(self, tick: int) -> FloatArray:
-        distance_m = np.hypot(self.pose[:, :, 0] - self.x_m, self.pose[:, :, 1] - self.y_m)
-        return self.leak.strength[:, None] * np.exp(-distance_m / self.reach_m)
+        distance_m = portable.hypot(self.pose[:, :, 0] - self.x_m, self.pose[:, :, 1] - self.y_m)
+        return self.leak.strength[:, None] * portable.exp(-distance_m / self.reach_m)
 
 
 @dataclass
@@ -62,7 +63,7 @@ class Sealer(CustomActuator):
     def act(self, tick: int, rows: IntArray, values: FloatArray) -> None:
         arena, robot = self.at(rows)
         x, y = self.scene.state[arena, robot, 0], self.scene.state[arena, robot, 1]
-        near = np.hypot(x - self.x_m, y - self.y_m) <= self.arm_m
+        near = portable.hypot(x - self.x_m, y - self.y_m) <= self.arm_m
         work = np.where(near, np.clip(values[:, 0], 0.0, 1.0), 0.0) * self.rate_per_s * self.scene.tick_s
         np.subtract.at(self.leak.strength, arena, work)
         np.maximum(self.leak.strength, 0.0, out=self.leak.strength)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.packet import Packets
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.robot.sensors.rays import ProximityReading
@@ -31,19 +32,19 @@ class Vectors:
     @property
     def length(self) -> FloatArray:
         """Lengths."""
-        return np.hypot(self.x, self.y)
+        return portable.hypot(self.x, self.y)
 
     @property
     def angle_rad(self) -> FloatArray:
         """Directions in [-pi, pi], 0 ahead, positive to the left; 0 for a vector of no length."""
-        return np.arctan2(self.y, self.x)
+        return portable.atan2(self.y, self.x)
 
     def turned(self, by_rad: FloatArray) -> "Vectors":
         """Return the vectors turned to the left, each by its angle.
 
         A turn by the robot's heading leads from the robot's frame to the axes of the compass, its negative back.
         """
-        cosine, sine = np.cos(by_rad), np.sin(by_rad)
+        cosine, sine = portable.cos(by_rad), portable.sin(by_rad)
         return Vectors(self.x * cosine - self.y * sine, self.x * sine + self.y * cosine)
 
     def __add__(self, other: "Vectors") -> "Vectors":
@@ -60,7 +61,7 @@ class Vectors:
 
 def along(angle_rad: FloatArray) -> Vectors:
     """Return vectors of length 1 in these directions."""
-    return Vectors(np.cos(angle_rad), np.sin(angle_rad))
+    return Vectors(portable.cos(angle_rad), portable.sin(angle_rad))
 
 
 def ahead(n: int) -> Vectors:
@@ -121,7 +122,8 @@ def repulsion_of_ranges(range_m: FloatArray, angle_rad: FloatArray, reach_m: flo
     """
     near = np.maximum(1.0 - range_m / reach_m, 0.0)
     rays = len(angle_rad)
-    x, y = np.add.reduce(near * np.cos(angle_rad), 1), np.add.reduce(near * np.sin(angle_rad), 1)
+    x = portable.ordered_sum(near * portable.cos(angle_rad))
+    y = portable.ordered_sum(near * portable.sin(angle_rad))
     return Vectors(-x / rays, -y / rays)
 
 
@@ -153,4 +155,4 @@ def steered(direction: Vectors, speed_mps: float, turn_gain_per_s: float) -> tup
     a vector to its rear. For a vector of length 0 it drives straight on.
     """
     angle = direction.angle_rad
-    return speed_mps * np.maximum(np.cos(angle), 0.0), turn_gain_per_s * angle
+    return speed_mps * np.maximum(portable.cos(angle), 0.0), turn_gain_per_s * angle

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, TypeVar, cast
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.packet import Packets
 from swarmwire.agent.robots import Robots
 from swarmwire.comms.base.arrays import FloatArray, IntArray
@@ -203,7 +204,7 @@ class PolicyLayout:
         drive = self.body.drive
         if isinstance(drive, Holonomic):
             lateral = action[:, 1] * self._speed_mps
-            scale = _scale(np.hypot(linear, lateral), drive.max_linear_mps)
+            scale = _scale(portable.hypot(linear, lateral), drive.max_linear_mps)
             robots.drive(linear * scale, angular, lateral * scale)
         elif isinstance(drive, Twist):  # its two limits are independent
             robots.drive(linear, angular)
@@ -269,7 +270,7 @@ def _scale(fastest_mps: FloatArray, limit_mps: float) -> FloatArray:
 def _sine_and_cosine(angle: FloatArray) -> tuple[Float32Array, Float32Array]:
     """Return sine and cosine in the precision of observations, which takes a quarter of the time."""
     narrow = angle.astype(np.float32)
-    return np.sin(narrow), np.cos(narrow)
+    return portable.sin(narrow), portable.cos(narrow)
 
 
 def _measured(received: Packets[Message], measure: str, index: IntArray) -> list[FloatArray | Float32Array]:

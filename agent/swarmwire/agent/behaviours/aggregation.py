@@ -4,6 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.behaviours.random_walk import (
     Walk,
     begin_spells,
@@ -70,17 +71,17 @@ class Aggregation(VectorAgent[Gathering]):
         near_neighbours = received.sum((received.range_m <= self.near_m).astype(np.float64))
         self._change_phase(robots, memory, near_neighbours)
 
-        x, y = received.sum(np.cos(received.bearing_rad)), received.sum(np.sin(received.bearing_rad))
-        direction = np.arctan2(y, x) + np.where(memory.phase == REPEL, np.pi, 0.0)
+        x, y = received.sum(portable.cos(received.bearing_rad)), received.sum(portable.sin(received.bearing_rad))
+        direction = portable.atan2(y, x) + np.where(memory.phase == REPEL, np.pi, 0.0)
         self._walk(robots, memory, received.count() > 0, direction)
         robots.radio.send(Beacon)
 
     def _change_phase(self, robots: Robots, memory: Gathering, near_neighbours: FloatArray) -> None:
         """Change each robot's phase at most once; a change ends the spell."""
         period_s, before = robots.period_s, memory.phase.copy()
-        leave_per_s = self.leave_per_s / (1.0 + near_neighbours) ** self.crowding
-        leaves = robots.draw.uniform("leave") < -np.expm1(-leave_per_s * period_s)
-        returns = robots.draw.uniform("return") < -np.expm1(-self.return_per_s * period_s)
+        leave_per_s = self.leave_per_s / portable.power(1.0 + near_neighbours, self.crowding)
+        leaves = robots.draw.uniform("leave") < -portable.expm1(-leave_per_s * period_s)
+        returns = robots.draw.uniform("return") < -portable.expm1(-self.return_per_s * period_s)
         memory.phase[before == START] = APPROACH
         memory.phase[(before <= APPROACH) & (near_neighbours > 0.0)] = WAIT
         memory.phase[(before == WAIT) & leaves] = REPEL

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import Memory, VectorAgent
 from swarmwire.comms.base.arrays import FloatArray
@@ -40,7 +41,7 @@ class Avoidance(VectorAgent):
         """Drive straight, or turn away."""
         proximity = robots.proximity
         x, y = proximity.vector_sum()
-        angle = np.arctan2(y, x)
+        angle = portable.atan2(y, x)
         undetected = np.max(proximity.value, axis=1) < self.detection_threshold
         behind = np.abs(angle) > self.behind_rad
         far_ahead = (np.abs(angle) <= self.ahead_rad) & (np.min(proximity.distance_m, axis=1) > self.safe_m)

@@ -5,6 +5,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.behaviours._common import check_order
 from swarmwire.agent.fields import Vectors, along, hysteresis, low_pass, steered
 from swarmwire.agent.robots import Robots
@@ -146,16 +147,16 @@ class BeaconAvoidance(VectorAgent[Traffic]):
         shift_m = HEAD_ON_M / self.speed_mps * course_mps
         x_m = memory.x_m + x_mps * encounter_s - shift_m.y[:, None]
         y_m = memory.y_m + y_mps * encounter_s + shift_m.x[:, None]
-        miss_m = np.hypot(x_m, y_m)
+        miss_m = portable.hypot(x_m, y_m)
         imminence = np.maximum(1.0 - miss_m / self.clear_m, 0.0) * np.maximum(1.0 - encounter_s / self.horizon_s, 0.0)
         encounter_push = self.strength * imminence / np.maximum(miss_m, MIN_DIVISOR)
-        distance_m = np.hypot(memory.x_m, memory.y_m)
+        distance_m = portable.hypot(memory.x_m, memory.y_m)
         proximity = np.maximum(1.0 - distance_m / self.close_m, 0.0)
         close_push = self.close * proximity / np.maximum(distance_m, MIN_DIVISOR)
         occupied = np.where(memory.sender == NO_ROBOT, 0.0, 1.0)
         x = occupied * (encounter_push * x_m + close_push * memory.x_m)
         y = occupied * (encounter_push * y_m + close_push * memory.y_m)
-        return Vectors(-np.add.reduce(x, 1), -np.add.reduce(y, 1))
+        return Vectors(-portable.ordered_sum(x), -portable.ordered_sum(y))
 
     def _filter(self, push: Vectors, memory: Traffic, period_s: float) -> None:
         """Apply hysteresis and low-pass to the push."""
@@ -195,7 +196,7 @@ def remember(table: NeighbourTable, sightings: Sightings) -> None:
         for name, new in zip(NeighbourTable.columns, new_columns, strict=True)
     }
     newest = _newest(rows, entries["sender"], entries["sequence"])
-    nearest, slot = _nearest(newest, rows, entries["sender"], np.hypot(entries["x_m"], entries["y_m"]))
+    nearest, slot = _nearest(newest, rows, entries["sender"], portable.hypot(entries["x_m"], entries["y_m"]))
     forget(table, -np.inf)
     for name in NeighbourTable.columns:
         getattr(table, name)[rows[nearest], slot] = entries[name][nearest]

@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.behaviours._common import check_order
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import BoolColumn, Memory, VectorAgent, column
@@ -75,8 +76,8 @@ class LennardJonesFlocking(VectorAgent[WheelHysteresis]):
         in_reach = received.range_m < self.reach * self.target_m
         force = np.where(in_reach, self.force(received.range_m), 0.0)
         neighbours = np.maximum(received.sum(in_reach.astype(np.float64)), 1.0)
-        x = received.sum(force * np.cos(received.bearing_rad)) / neighbours
-        y = received.sum(force * np.sin(received.bearing_rad)) / neighbours
+        x = received.sum(force * portable.cos(received.bearing_rad)) / neighbours
+        y = received.sum(force * portable.sin(received.bearing_rad)) / neighbours
         x, y = _cut(x, y, self.speed_mps)
         light_x, light_y = self._to_light(robots)
         self._drive(robots, memory, x + light_x, y + light_y)
@@ -85,13 +86,13 @@ class LennardJonesFlocking(VectorAgent[WheelHysteresis]):
     def force(self, distance_m: FloatArray) -> FloatArray:
         """Return the force of neighbours at these distances (k,), in m/s; negative ones repel."""
         distance_m = np.maximum(distance_m, NEAREST_M)
-        ratio = np.power(self.target_m / distance_m, self.exponent)
+        ratio = portable.power(self.target_m / distance_m, self.exponent)
         return -self.gain / distance_m * (ratio * ratio - ratio)
 
     def _to_light(self, robots: Robots) -> tuple[FloatArray, FloatArray]:
         """Return x and y of the vectors to the light, (n,) each; 0 without a light."""
         x, y = robots.light.vector_sum()
-        length = np.hypot(x, y)
+        length = portable.hypot(x, y)
         scale = np.where(
             length >= self.detection_threshold,
             self.light * self.speed_mps / np.maximum(length, self.detection_threshold),
@@ -101,7 +102,7 @@ class LennardJonesFlocking(VectorAgent[WheelHysteresis]):
 
     def _drive(self, robots: Robots, memory: WheelHysteresis, x: FloatArray, y: FloatArray) -> None:
         """Turn the wheels such that the robots drive towards the vectors (x, y), (n,) each."""
-        angle, speed = np.arctan2(y, x), np.minimum(np.hypot(x, y), self.speed_mps)
+        angle, speed = portable.atan2(y, x), np.minimum(portable.hypot(x, y), self.speed_mps)
         deviation: FloatArray = np.abs(angle)
         hard: BoolArray = (deviation > self.hard_rad) | (memory.hard & (deviation > self.soft_rad))
         memory.hard = hard
@@ -114,5 +115,5 @@ class LennardJonesFlocking(VectorAgent[WheelHysteresis]):
 
 def _cut(x: FloatArray, y: FloatArray, longest: float) -> tuple[FloatArray, FloatArray]:
     """Cut vectors (n,) to the length `longest`, in the same directions."""
-    scale = longest / np.maximum(np.hypot(x, y), longest)
+    scale = longest / np.maximum(portable.hypot(x, y), longest)
     return scale * x, scale * y

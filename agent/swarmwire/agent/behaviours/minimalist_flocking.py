@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import IntColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
@@ -48,7 +49,7 @@ class Sectors:
         front = (angle_rad > -FRONT_RAD) & (angle_rad <= FRONT_RAD)
         left = (angle_rad > FRONT_RAD) & (angle_rad <= REAR_RAD)
         right = (angle_rad > -REAR_RAD) & (angle_rad <= -FRONT_RAD)
-        sine = np.sin(angle_rad)
+        sine = portable.sin(angle_rad)
         answer = np.ascontiguousarray(reading.value.T)
         return cls(answer, front, left, ~(front | left | right), right, sine > MIN_SINE, sine < -MIN_SINE)
 

@@ -8,6 +8,7 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, Memory, VectorAgent, column
 from swarmwire.comms.base.angles import wrap_by_modulo
@@ -44,12 +45,12 @@ def turns_away(robots: Robots, detection_threshold: float) -> tuple[BoolArray, F
     is that of these rays' vector sum.
     """
     proximity = robots.proximity
-    value = np.where(np.cos(proximity.angle_rad) > 0.0, proximity.value, 0.0)
+    value = np.where(portable.cos(proximity.angle_rad) > 0.0, proximity.value, 0.0)
     blocked = np.max(value, axis=1) >= detection_threshold
-    x = np.add.reduce(value * np.cos(proximity.angle_rad), 1)
-    y = np.add.reduce(value * np.sin(proximity.angle_rad), 1)
+    x = portable.ordered_sum(value * portable.cos(proximity.angle_rad))
+    y = portable.ordered_sum(value * portable.sin(proximity.angle_rad))
     half_circle = robots.draw.uniform("turn away", -0.5 * np.pi, 0.5 * np.pi)
-    return blocked, np.arctan2(y, x) + np.pi + half_circle
+    return blocked, portable.atan2(y, x) + np.pi + half_circle
 
 
 def walk(robots: Robots, memory: Walk, speed_mps: float, turn_radps: float, moving: BoolArray | None = None) -> None:
@@ -100,13 +101,13 @@ class RandomWalk(VectorAgent[Walk]):
 def spell_lengths(robots: Robots, mean_m: float, exponential: bool = True) -> FloatArray:
     """Draw the length of a new spell for each robot, (n,)."""
     unit = robots.draw.uniform("spell")
-    return -mean_m * np.log1p(-unit) if exponential else np.full(robots.n, mean_m)
+    return -mean_m * portable.log1p(-unit) if exponential else np.full(robots.n, mean_m)
 
 
 def random_turns(robots: Robots, persistence: float) -> FloatArray:
     """Draw turns from the wrapped Cauchy distribution with the mean cosine `persistence`, (n,)."""
     half = robots.draw.uniform("turn", -0.5 * np.pi, 0.5 * np.pi)
-    return 2.0 * np.arctan2((1.0 - persistence) * np.sin(half), (1.0 + persistence) * np.cos(half))
+    return 2.0 * portable.atan2((1.0 - persistence) * portable.sin(half), (1.0 + persistence) * portable.cos(half))
 
 
 class Diffusion(VectorAgent):
@@ -130,8 +131,8 @@ class Diffusion(VectorAgent):
         proximity = robots.proximity
         rays = len(proximity.angle_rad)
         x, y = proximity.vector_sum()
-        angle = np.arctan2(y, x)
-        straight = (np.abs(angle) <= self.go_straight_rad) & (np.hypot(x, y) < self.nearness * rays)
+        angle = portable.atan2(y, x)
+        straight = (np.abs(angle) <= self.go_straight_rad) & (portable.hypot(x, y) < self.nearness * rays)
         turn_right = angle > 0.0
         robots.wheels(
             np.where(straight | turn_right, self.speed_mps, 0.0), np.where(straight | ~turn_right, self.speed_mps, 0.0)
@@ -173,11 +174,11 @@ class Coverage(VectorAgent[Walk]):
         received = robots.radio.received(Present)
         repulsion = self.repulsion_m2 / np.maximum(received.range_m, self.nearest_m) ** 2
         direction = random_turns(robots, 0.0)
-        x = np.cos(direction) - received.sum(repulsion * np.cos(received.bearing_rad))
-        y = np.sin(direction) - received.sum(repulsion * np.sin(received.bearing_rad))
+        x = portable.cos(direction) - received.sum(repulsion * portable.cos(received.bearing_rad))
+        y = portable.sin(direction) - received.sum(repulsion * portable.sin(received.bearing_rad))
 
         length = spell_lengths(robots, self.spell_m)
-        begin_spells(memory, spell_ended(memory), np.arctan2(y, x), length)
+        begin_spells(memory, spell_ended(memory), portable.atan2(y, x), length)
         blocked, away = turns_away(robots, self.detection_threshold)
         begin_spells(memory, blocked & (memory.turn_rad == 0.0), away, length)
         walk(robots, memory, self.speed_mps, self.turn_radps)

@@ -4,6 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import Memory, VectorAgent
 from swarmwire.comms.base.angles import wrap_by_modulo
@@ -42,10 +43,10 @@ class Vicsek(VectorAgent):
         """Compute the next direction, move along it, and broadcast it."""
         heading = robots.compass.heading_rad
         received = robots.radio.received(Direction)
-        x = np.cos(heading) + received.sum(np.cos(received.message.heading_rad))
-        y = np.sin(heading) + received.sum(np.sin(received.message.heading_rad))
+        x = portable.cos(heading) + received.sum(portable.cos(received.message.heading_rad))
+        y = portable.sin(heading) + received.sum(portable.sin(received.message.heading_rad))
         half = 0.5 * self.noise_rad
-        direction = np.arctan2(y, x) + robots.draw.uniform("noise of the direction", -half, half)
+        direction = portable.atan2(y, x) + robots.draw.uniform("noise of the direction", -half, half)
         self._move(robots, wrap_by_modulo(direction - heading))
         robots.radio.send(Direction, heading_rad=direction)
 
@@ -55,9 +56,10 @@ class Vicsek(VectorAgent):
         A body that turns while it drives moves on an arc. The chord, of length v dt, is shorter than the arc, and lies
         half the turn to the side of the first direction of motion.
         """
-        arc = self.speed_mps / np.sinc(turn / (2.0 * np.pi))
+        half = 0.5 * turn
+        arc = self.speed_mps * np.divide(half, portable.sin(half), out=np.ones_like(half), where=half != 0.0)
         robots.drive(
-            linear_mps=arc * np.cos(0.5 * turn),
-            lateral_mps=arc * np.sin(0.5 * turn),
+            linear_mps=arc * portable.cos(half),
+            lateral_mps=arc * portable.sin(half),
             angular_radps=turn / robots.period_s,
         )

@@ -9,6 +9,7 @@ rays of bundled bodies, and the turns of behaviours.
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import FloatArray
 
 TURN_RAD = 2.0 * np.pi
@@ -32,7 +33,7 @@ def wrap_angles(angle_rad: FloatArray) -> FloatArray:
 
 def wrap_by_atan2(angle_rad: FloatArray) -> FloatArray:
     """Wrap angles of any shape to [-pi, pi]; angles in this range change by up to 2 units in the last place."""
-    return np.arctan2(np.sin(angle_rad), np.cos(angle_rad))
+    return portable.atan2(portable.sin(angle_rad), portable.cos(angle_rad))
 
 
 def wrap_by_modulo(angle_rad: FloatArray) -> FloatArray:

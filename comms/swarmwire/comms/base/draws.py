@@ -2,8 +2,7 @@
 
 One counter-based generator, Philox 4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011):
 a draw is a pure function of a 64-bit key (its owner) and four 32-bit counters (its purpose). This is the numpy
-form; `draws_compiled` is the numba form, equal bit for bit. Normals therefore use + - * / and sqrt only, also for the
-logarithm.
+form; `draws_compiled` is the numba form, equal bit for bit.
 """
 
 from hashlib import blake2b
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swarmwire.comms.base import math
 from swarmwire.comms.base.arrays import FloatArray, KeyArray
 
 Words = NDArray[np.uint64]
@@ -89,8 +89,6 @@ FAR_TAIL = (
         2.04426310338993978564e-15,
     ),
 )
-LN2 = 0.6931471805599453
-SQRT2 = 1.4142135623730951
 
 
 def derive_key(*parts: int | str) -> int:
@@ -139,7 +137,7 @@ def normal_quantile(p: FloatArray) -> FloatArray:
     q = p - 0.5
     nearest_end = np.where(q < 0.0, p, 1.0 - p)
     # 1 - p may round to zero just below one; the smallest step keeps the logarithm finite.
-    root = np.sqrt(-_log(np.maximum(nearest_end, 0.5 * TO_UNIT)))
+    root = np.sqrt(-math.log(np.maximum(nearest_end, 0.5 * TO_UNIT)))
     centre = q * _ratio(CENTRE, 0.180625 - q * q)
     tail = np.where(root <= 5.0, _ratio(TAIL, root - 1.6), _ratio(FAR_TAIL, root - 5.0))
     return np.where(np.abs(q) <= 0.425, centre, np.where(q < 0.0, -tail, tail))
@@ -154,19 +152,3 @@ def _horner(coefficients: tuple[float, ...], x: FloatArray) -> FloatArray:
     for coefficient in coefficients[-2::-1]:
         total = total * x + coefficient
     return total
-
-
-def _log(x: FloatArray) -> FloatArray:
-    """Natural logarithm of x > 0 by exponent and the series of 2 artanh((m - 1)/(m + 1))."""
-    bits = np.asarray(x, np.float64).view(np.uint64)
-    exponent = (bits >> np.uint64(52)).astype(np.int64) - 1023
-    mantissa = ((bits & np.uint64(0xFFFFFFFFFFFFF)) | np.uint64(0x3FF0000000000000)).view(np.float64)
-    high = mantissa > SQRT2
-    mantissa = np.where(high, mantissa * 0.5, mantissa)
-    exponent = exponent + high
-    s = (mantissa - 1.0) / (mantissa + 1.0)
-    z = s * s
-    series: Any = 1.0 / 23.0
-    for odd in range(21, 0, -2):
-        series = series * z + 1.0 / odd
-    return exponent * LN2 + 2.0 * s * series

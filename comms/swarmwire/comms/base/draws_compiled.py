@@ -6,13 +6,13 @@ import numpy as np
 
 from swarmwire.comms.base import draws
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math.compiled import log
 
 _M0, _M1 = (np.uint64(m) for m in draws.MULTIPLIERS)
 _W0, _W1 = (np.uint64(w) for w in draws.WEYL)
 _LOW = np.uint64(draws.LOW32)
-_S32, _S11, _S52 = np.uint64(32), np.uint64(11), np.uint64(52)
-_MANTISSA, _ONE_BITS = np.uint64(0xFFFFFFFFFFFFF), np.uint64(0x3FF0000000000000)
-_TO_UNIT, _LN2, _SQRT2 = draws.TO_UNIT, draws.LN2, draws.SQRT2
+_S32, _S11 = np.uint64(32), np.uint64(11)
+_TO_UNIT = draws.TO_UNIT
 _ROUNDS = draws.ROUNDS
 _CENTRE, _TAIL, _FAR_TAIL = draws.CENTRE, draws.TAIL, draws.FAR_TAIL
 
@@ -42,7 +42,7 @@ def normal_quantile(p: float):
     q = p - 0.5
     if abs(q) <= 0.425:
         return q * _ratio(_CENTRE, 0.180625 - q * q)
-    root = np.sqrt(-_log(max(p if q < 0.0 else 1.0 - p, 0.5 * _TO_UNIT)))
+    root = np.sqrt(-log(max(p if q < 0.0 else 1.0 - p, 0.5 * _TO_UNIT)))
     tail = _ratio(_TAIL, root - 1.6) if root <= 5.0 else _ratio(_FAR_TAIL, root - 5.0)
     return -tail if q < 0.0 else tail
 
@@ -54,19 +54,3 @@ def _ratio(pieces: tuple[tuple[float, ...], tuple[float, ...]], x: float):
         above = above * x + pieces[0][i]
         below = below * x + pieces[1][i]
     return above / below
-
-
-@njit()
-def _log(x: float):
-    bits = np.float64(x).view(np.uint64)
-    exponent = np.int64(bits >> _S52) - 1023
-    mantissa = np.uint64((bits & _MANTISSA) | _ONE_BITS).view(np.float64)
-    if mantissa > _SQRT2:
-        mantissa = mantissa * 0.5
-        exponent += 1
-    s = (mantissa - 1.0) / (mantissa + 1.0)
-    z = s * s
-    series = 1.0 / 23.0
-    for odd in range(21, 0, -2):
-        series = series * z + 1.0 / odd
-    return exponent * _LN2 + 2.0 * s * series

@@ -96,7 +96,7 @@ class DaskExecutor:
         self._campaign = f"swarmwire-{uuid4().hex}"  # name of the plugin, the resource and the topic of events
         self._tasks: dict[str, Task] = {}  # submitted tasks by dask's key
         self._futures = SimpleQueue[Any]()  # filled by callbacks, since as_completed has no timeout
-        self._begun, self._mute_polls, self._cpus = False, 0, {provenance.cpu()}
+        self._begun, self._mute_polls = False, 0
         self._polled_ns = self._worked_ns = self._clock.now_ns()
         with ExitStack() as stack:
             stack.enter_context(_quiet_client())
@@ -163,18 +163,10 @@ class DaskExecutor:
         self._client.subscribe_topic(self._campaign, self._worker_came)
 
     def _worker_came(self, event: tuple[float, Mapping[str, str]]) -> None:
-        """Report a worker that came later and does not fit, and another type of CPU."""
+        """Report a worker that came later and does not fit."""
         _, message = event
         if message["fault"]:
             self._report(f"left out: worker {message['worker']}: {message['fault']}")
-        else:
-            self._report_other_cpu(message["worker"], message["cpu"])
-
-    def _report_other_cpu(self, worker: str, cpu: str) -> None:
-        if cpu not in self._cpus:
-            self._cpus.add(cpu)
-            consequence = "runs are the same bit for bit only on one type of CPU (column machine_cpu)"
-            self._report(f"worker {worker} has another CPU: {cpu}: {consequence}")
 
     def _result(self, future: Any) -> Finished:
         task = self._tasks.pop(future.key)
@@ -237,7 +229,6 @@ class DaskExecutor:
             fault = fault_of(environment(), answer)
             if fault:
                 raise BadInput(OPTION, self._name, f"expected workers like this machine; worker {worker}: {fault}")
-            self._report_other_cpu(worker, answer["cpu"])
             fit += 1
         return fit
 
@@ -290,13 +281,13 @@ def _files(folder: Path) -> dict[str, bytes]:
 
 @cache  # imported code does not change if its files are replaced
 def environment(modules: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return versions, CPU and digests of the code of this process: of these modules, by default of swarmwire's."""
+    """Return versions and digests of the code of this process: of these modules, by default of swarmwire's."""
     digests = module_digests([f"{module}:" for module in modules])
-    return {"versions": provenance.versions(), "cpu": provenance.cpu(), "modules": digests}
+    return {"versions": provenance.versions(), "modules": digests}
 
 
 def fault_of(expected: Mapping[str, Any], actual: Mapping[str, Any]) -> str:
-    """Return the first difference of a worker's environment from the campaign's, or ""; CPUs may differ."""
+    """Return the first difference of a worker's environment from the campaign's, or ""."""
     for name, version in expected["versions"].items():
         if actual["versions"].get(name) != version:
             return f"{name} is {actual['versions'].get(name, 'not there')}; here it is {version}"
@@ -316,7 +307,7 @@ class Preparation(WorkerPlugin):
         """Write the files and add the resource, or raise if the worker does not fit."""
         actual = await asyncio.to_thread(environment, tuple(self._expected["modules"]))
         fault = fault_of(self._expected, actual)
-        worker.log_event(self.name, {"worker": worker.address, "fault": fault, "cpu": actual["cpu"]})
+        worker.log_event(self.name, {"worker": worker.address, "fault": fault})
         if fault:
             raise ClusterFailed(f"worker {worker.address}: {fault}")
         folder = Path(worker.local_directory) / self.name

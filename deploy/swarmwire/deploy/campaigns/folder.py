@@ -77,7 +77,7 @@ def _value_at(mapping: Mapping[str, Any], path: str) -> Any:
 
 
 def check_resumable(begun: Provenance, folder: Path, *, force: bool) -> None:
-    """Raise BadInput if the scenario's files, or, unless `force`, code, versions or CPU have changed."""
+    """Raise BadInput if the scenario's files, or, unless `force`, code or versions have changed."""
     changed = changed_files(begun.files, folder / SCENARIO_FOLDER)
     if changed:
         raise BadInput(f"--resume {folder}", "", f"{SCENARIO_FOLDER}/{changed[0]}")
@@ -89,5 +89,5 @@ def check_resumable(begun: Provenance, folder: Path, *, force: bool) -> None:
 
 
 def code_changes(begun: Provenance) -> list[str]:
-    """Return changes of code, versions and CPU since the beginning, a line each."""
-    return changes_since(begun.modules, begun.versions, begun.cpu, [f"{module}:" for module in begun.modules])
+    """Return changes of code and versions since the beginning, a line each."""
+    return changes_since(begun.modules, begun.versions, [f"{module}:" for module in begun.modules])

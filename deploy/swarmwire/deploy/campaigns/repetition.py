@@ -30,7 +30,7 @@ class Repetition:
     compared: int  # number of ticks, from the first, that could be compared
     first_difference: int | None  # the first tick that differs
     why_not_all: str  # reason for an incomplete comparison, or ""
-    changes: tuple[str, ...]  # changes since the original: files, modules, versions, CPU; a line each
+    changes: tuple[str, ...]  # changes since the original: files, modules, versions; a line each
 
     @property
     def same(self) -> bool | None:

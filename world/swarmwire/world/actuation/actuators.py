@@ -15,6 +15,7 @@ from swarmwire.comms.base import draws
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.draws_compiled import normal
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies import drives
 from swarmwire.comms.robot.bodies.body import MOTORS, WHEELS
@@ -109,7 +110,7 @@ def _within(limits, i, linear, angular, lateral):
         if fastest > max_linear * ROUNDING_FACTOR:
             return linear * (max_linear / fastest), angular * (max_linear / fastest), lateral, True
         return linear, angular, lateral, too_fast
-    size = np.hypot(linear, lateral)
+    size = math_compiled.hypot(linear, lateral)
     if size > max_linear * ROUNDING_FACTOR:
         too_fast = True
         linear, lateral = linear * (max_linear / size), lateral * (max_linear / size)

@@ -8,6 +8,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.sensors.simple import BatterySpec
 from swarmwire.world.actuation.actuators import HOLONOMIC, drive_limits_of, wheels_of_twist
@@ -79,7 +80,7 @@ def _drain(charge: AnyArray, draw: Any, alive: AnyArray, leds: AnyArray, target:
                 continue
             forward, turn, lateral = target[arena, i]
             if draw.holonomic[i]:
-                speed = np.hypot(forward, lateral)
+                speed = math_compiled.hypot(forward, lateral)
             else:
                 left, right = wheels_of_twist(forward, turn, draw.wheel_base_m[i])
                 speed = 0.5 * (abs(left) + abs(right))

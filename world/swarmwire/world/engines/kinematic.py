@@ -12,9 +12,11 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.robot_index import grid_over
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.world.engines.contacts import count_began, mark
 from swarmwire.world.engines.engine import EngineConfig
 from swarmwire.world.engines.position_correction import (
@@ -72,7 +74,7 @@ class KinematicEngine:
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick at targets (arenas, n, 3), and count the contacts that began, (arenas, 2)."""
         bodies = self._bodies
-        path_m = self._tick_s * float(np.hypot(target[:, :, 0], target[:, :, 2]).max())
+        path_m = self._tick_s * float(portable.hypot(target[:, :, 0], target[:, :, 2]).max())
         correction = self._corrections.within(float(bodies.discs.radius_m.max()) + path_m)
         _move(correction, bodies, target, self._tick_s)
         overlapping = overlaps(bodies.state, bodies.discs, bodies.pushed, bodies.running, correction, self._cells)
@@ -123,11 +125,13 @@ def _move_robot(correction, arena, disc, speeds, tick_s, state):
     substeps = max(int(np.ceil(path_m / (SUBSTEP_RADII * radius_m))), 1) if near else 1
     substep_s = tick_s / substeps
     half = 0.5 * turn * substep_s
-    chord_s = substep_s * np.sin(half) / half if half != 0.0 else substep_s  # a chord is shorter than its arc
+    chord_s = (
+        substep_s * math_compiled.sin(half) / half if half != 0.0 else substep_s
+    )  # a chord is shorter than its arc
     vx = vy = rolled = 0.0
     was_pushed = False
     for _ in range(substeps):
-        cos, sin = np.cos(heading + half), np.sin(heading + half)
+        cos, sin = math_compiled.cos(heading + half), math_compiled.sin(heading + half)
         dx, dy = (forward * cos - left * sin) * chord_s, (forward * sin + left * cos) * chord_s
         nx, ny, pushed, free = x + dx, y + dy, False, True
         outside = abs(nx) + radius_m > correction.half_x_m or abs(ny) + radius_m > correction.half_y_m
@@ -137,7 +141,7 @@ def _move_robot(correction, arena, disc, speeds, tick_s, state):
             nx, ny = x, y
         rolled += forward * substep_s + (nx - x - dx) * cos + (ny - y - dy) * sin
         heading += 2.0 * half
-        cos, sin = np.cos(heading), np.sin(heading)
+        cos, sin = math_compiled.cos(heading), math_compiled.sin(heading)
         vx, vy = forward * cos - left * sin, forward * sin + left * cos
         if pushed:
             vx, vy, was_pushed = (nx - x) / substep_s, (ny - y) / substep_s, True

@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacles import Obstacles, sides_of
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math import compiled as math_compiled
 
 GRAVITY_MPS2 = 9.81
 FLOOR_FRICTION = 0.5  # coefficient of friction of an obstacle on the floor
@@ -34,9 +36,9 @@ class Load:
             return 2.0 / 3.0 * self.radius_m
         side = sides_of(self.corners_m)
         angle = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False)
-        towards = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ side[:, 2:4].T
+        towards = portable.cos(angle)[:, None] * side[:, 2] + portable.sin(angle)[:, None] * side[:, 3]
         rim = np.where(towards > 0.0, side[:, 4] / np.maximum(towards, 1e-12), np.inf).min(axis=1)
-        return float(2.0 / 3.0 * (rim**3).mean() / (rim**2).mean())
+        return float(2.0 / 3.0 * portable.ordered_sum(rim * rim * rim) / portable.ordered_sum(rim * rim))
 
 
 def load_of(obstacle: Obstacle) -> Load:
@@ -47,7 +49,7 @@ def load_of(obstacle: Obstacle) -> Load:
         return Load(obstacle.mass_kg, obstacle.radius_m, np.empty((0, 2)), (0.0, 0.0), *pose)
     corners = replace(obstacle, x_m=0.0, y_m=0.0, heading_rad=0.0).corners_m
     cx, cy = _centroid(corners)
-    c, s = np.cos(obstacle.heading_rad), np.sin(obstacle.heading_rad)
+    c, s = portable.cos(obstacle.heading_rad), portable.sin(obstacle.heading_rad)
     x, y = obstacle.x_m + (c * cx - s * cy), obstacle.y_m + (s * cx + c * cy)
     return Load(obstacle.mass_kg, 0.0, corners - np.array([cx, cy]), (cx, cy), x, y, obstacle.heading_rad)
 
@@ -55,8 +57,9 @@ def load_of(obstacle: Obstacle) -> Load:
 def _centroid(corners: FloatArray) -> tuple[float, float]:
     (x, y), (u, v) = corners.T, np.roll(corners, -1, axis=0).T
     twice = x * v - u * y
-    area = 3.0 * twice.sum()
-    return float(((x + u) * twice).sum() / area), float(((y + v) * twice).sum() / area)
+    area = 3.0 * portable.ordered_sum(twice)
+    x_sum, y_sum = portable.ordered_sum((x + u) * twice), portable.ordered_sum((y + v) * twice)
+    return float(x_sum / area), float(y_sum / area)
 
 
 class Movables:
@@ -120,7 +123,7 @@ def _move(
         for i in range(per_arena):
             k = arena * per_arena + i
             x, y, heading, row = state[arena, i, 0], state[arena, i, 1], state[arena, i, 2], rows[k]
-            c, s = np.cos(heading), np.sin(heading)
+            c, s = math_compiled.cos(heading), math_compiled.sin(heading)
             cx, cy = centre[k]
             pose[arena, i] = x - (c * cx - s * cy), y - (s * cx + c * cy), heading
             if circular[k]:

@@ -21,6 +21,7 @@ from pymunk.constraints import PivotJoint
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.world.engines.contacts import count_began, mark, pairs_of
 from swarmwire.world.engines.engine import EngineConfig, EngineMotors
 from swarmwire.world.engines.movable import FLOOR_FRICTION, GRAVITY_MPS2, Load, Movables
@@ -82,7 +83,7 @@ def set_forces(
         for i in range(robots):
             heading, vx, vy, turn = state[arena, i, 2], state[arena, i, 3], state[arena, i, 4], state[arena, i, 5]
             middle = heading + 0.5 * dt_s * turn
-            rolled = dt_s * (vx * np.cos(middle) + vy * np.sin(middle))
+            rolled = dt_s * (vx * math_compiled.cos(middle) + vy * math_compiled.sin(middle))
             turned = 0.5 * dt_s * turn * motors.wheel_base_m[i]
             travel_m[arena, i, 0] += rolled - turned
             travel_m[arena, i, 1] += rolled + turned
@@ -93,7 +94,11 @@ def set_forces(
             torque = min(max((target[arena, i, 1] - turn + lost_turn) * inertia / dt_s, -bound), bound)
             unhindered[arena, i] = turn + torque * dt_s / inertia
             next_heading = heading + dt_s * (turn + 0.5 * unhindered[arena, i])
-            cos, sin, mass_per_step = np.cos(next_heading), np.sin(next_heading), motors.mass_kg[i] / dt_s
+            cos, sin, mass_per_step = (
+                math_compiled.cos(next_heading),
+                math_compiled.sin(next_heading),
+                motors.mass_kg[i] / dt_s,
+            )
             forward, left = target[arena, i, 0], target[arena, i, 2]
             fx, fy = (
                 (forward * cos - left * sin - vx) * mass_per_step,

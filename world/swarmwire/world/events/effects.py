@@ -10,6 +10,7 @@ from functools import reduce
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.radio.config.radio import Radio
@@ -78,7 +79,7 @@ class Lifetimes:
         row = np.flatnonzero(robots)
         arena, index = np.divmod(row, len(robots) // len(self.keys))
         u = uniform(self.keys[arena], index, self.serial, failures.lives[row], LIFETIME_PURPOSE)
-        life_ns = -np.log1p(-u) * (HOUR_NS / self.per_hour)
+        life_ns = -portable.log1p(-u) * (HOUR_NS / self.per_hour)
         failures.next_ns[row] = start_ns[row] + np.minimum(life_ns, NEVER_NS // 4).astype(np.int64)
         failures.lives[row] += 1
 

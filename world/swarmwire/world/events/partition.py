@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
@@ -38,7 +39,7 @@ class PartitionRegion:
         """True for robots at `pose` (rows, 3) whose centre is in the region, (rows,)."""
         offset_m = pose[:, :2] - self.at
         if self.radius_m is not None:
-            return np.hypot(offset_m[:, 0], offset_m[:, 1]) <= self.radius_m
+            return portable.hypot(offset_m[:, 0], offset_m[:, 1]) <= self.radius_m
         inside = np.abs(offset_m) <= 0.5 * np.array(self.size_m)
         return inside[:, 0] & inside[:, 1]
 

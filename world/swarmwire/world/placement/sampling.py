@@ -10,6 +10,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.geometry.robot_index import column_of, row_of
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.world.placement.occupancy import (
     Disc,
@@ -45,7 +46,7 @@ def candidate(region, key, entity, attempt, purpose):
     if region.kind == RING:
         inner2 = region.inner_m * region.inner_m
         r = np.sqrt(inner2 + u * (region.half_x_m * region.half_x_m - inner2))
-        return region.x_m + r * np.cos(TURN_RAD * v), region.y_m + r * np.sin(TURN_RAD * v), True
+        return region.x_m + r * math_compiled.cos(TURN_RAD * v), region.y_m + r * math_compiled.sin(TURN_RAD * v), True
     u, v = 2.0 * u - 1.0, 2.0 * v - 1.0
     inside = region.kind == BOX or u * u + v * v <= 1.0
     return region.x_m + u * region.half_x_m, region.y_m + v * region.half_y_m, inside
@@ -85,7 +86,7 @@ def free_polygon(
         if not np.isfinite(heading_rad):
             turn = (uniform(key, entity, attempt, 2, purpose) - 0.5) * TURN_RAD
         x, y, inside = candidate(region, key, entity, attempt, purpose)
-        c, s = np.cos(turn), np.sin(turn)
+        c, s = math_compiled.cos(turn), math_compiled.sin(turn)
         placed[:, 0] = x + c * corners[:, 0] - s * corners[:, 1]
         placed[:, 1] = y + s * corners[:, 0] + c * corners[:, 1]
         if inside and polygon_clear_of_obstacles(occupancy, placed, gap_m):

@@ -13,10 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex, obstacles_near
 from swarmwire.comms.base.geometry.robot_index import sort
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.robot.sensors.camera import CameraSpec
 from swarmwire.comms.robot.sensors.sensor import Field
 from swarmwire.world.sensors.rays import RobotIndex, near_robots, nearest, obstacle_indices_of, robot_index_of
@@ -122,7 +124,7 @@ class CameraSensor(BuiltInSensor[CameraSpec]):
         scene, group, spec = self.scene, self.group, self.spec
         reach_m = spec.reach_m(group.body.altitude_m)
         self._shape = len(scene.keys), group.stop - group.start, spec.max_blobs
-        led_radius_m = np.hypot(scene.led_positions_m[..., 0], scene.led_positions_m[..., 1])
+        led_radius_m = portable.hypot(scene.led_positions_m[..., 0], scene.led_positions_m[..., 1])
         overhang_m = float(np.max(led_radius_m - scene.radius_m[:, None], initial=0.0))
         self._robots = robot_index_of(scene, reach_m + overhang_m + float(scene.radius_m.max()))
         self._obstacles = obstacle_indices_of(scene, reach_m)
@@ -163,10 +165,13 @@ def _list_blobs(blobs, arena, i, eye, nearby, reach_m, leds):
     """Set the blobs of one row: the lit LEDs in sight on the nearby robots."""
     robots = nearby.robots
     x, y, eye_z, heading = eye
-    c, s, count = np.cos(heading), np.sin(heading), 0
+    c, s, count = math_compiled.cos(heading), math_compiled.sin(heading), 0
     for k in range(nearby.robot_count):
         other = robots.nearby[k]
-        turn_c, turn_s = np.cos(robots.state[arena, other, 2]), np.sin(robots.state[arena, other, 2])
+        turn_c, turn_s = (
+            math_compiled.cos(robots.state[arena, other, 2]),
+            math_compiled.sin(robots.state[arena, other, 2]),
+        )
         for led in range(leds.rgb.shape[2]):
             colour = leds.rgb[arena, other, led]
             if colour == 0:
@@ -180,7 +185,7 @@ def _list_blobs(blobs, arena, i, eye, nearby, reach_m, leds):
                 continue
             line = SightLine(x, y, eye_z, to_x, to_y, z - eye_z)
             if not _is_hidden(line, nearby):
-                bearing = np.arctan2(c * to_y - s * to_x, c * to_x + s * to_y)
+                bearing = math_compiled.atan2(c * to_y - s * to_x, c * to_x + s * to_y)
                 count = _insert(blobs, arena, i, count, distance, bearing, colour)
 
 

@@ -14,6 +14,7 @@ from swarmwire.comms.base.draws import normal as normals
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.robot.sensors.imu import ImuSpec
 from swarmwire.world.sensors.sensor import BuiltInSensor
 
@@ -78,7 +79,7 @@ def _measure(imu: Any, tick: int):
             measured, bias = imu.measured[arena, i], imu.bias[arena, i]
             heading = 0.5 * (previous[0] + state[2])
             ax, ay = (state[3] - previous[1]) / tick_s, (state[4] - previous[2]) / tick_s
-            c, s = np.cos(heading), np.sin(heading)
+            c, s = math_compiled.cos(heading), math_compiled.sin(heading)
             measured[0] = c * ax + s * ay
             measured[1] = c * ay - s * ax
             measured[2] = (state[2] - previous[0]) / tick_s

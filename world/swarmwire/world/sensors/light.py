@@ -12,6 +12,7 @@ from swarmwire.comms.base.geometry.line_of_sight import cell_at, cell_number, ob
 from swarmwire.comms.base.geometry.obstacles import ray_to_circle
 from swarmwire.comms.base.geometry.robot_index import sort
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.robot.sensors.light import LightSpec
 from swarmwire.world.sensors.rays import nearest, obstacle_indices_of, robot_index_of
 from swarmwire.world.sensors.sensor import BuiltInSensor
@@ -106,8 +107,8 @@ def _add_lights(value, start, angle, robots, widest_m, obstacles, lights):
                 continue
             if robot_between(robots, widest_m, arena, robot, x, y, to_x, to_y):
                 continue
-            brightness = np.exp(-2.0 * distance / intensity)
-            bearing = np.arctan2(dy, dx) - robots.state[arena, robot, 2]
+            brightness = math_compiled.exp(-2.0 * distance / intensity)
+            bearing = math_compiled.atan2(dy, dx) - robots.state[arena, robot, 2]
             for cell in range(len(angle)):
                 deviation = abs(bearing - angle[cell]) % TURN_RAD
                 deviation = min(deviation, TURN_RAD - deviation)

@@ -11,11 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices, obstacles_near, ray_to_obstacle
 from swarmwire.comms.base.geometry.obstacles import ray_to_circle
 from swarmwire.comms.base.geometry.robot_index import Grid, column_of, grid_over, row_of, sort
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.sensors.rays import FORMS, InfraredSpec, ProximitySpec, RayArraySpec
 from swarmwire.world.sensors.sensor import BuiltInSensor, Scene
@@ -146,8 +148,8 @@ class RayArraySight:
         walled, (width, height) = scene.boundary == "walls", scene.size_m
         self._rays = RayArray(
             group.start,
-            np.cos(spec.angle_rad),
-            np.sin(spec.angle_rad),
+            portable.cos(spec.angle_rad),
+            portable.sin(spec.angle_rad),
             spec.range_m,
             0.5 * width if walled else np.inf,
             0.5 * height if walled else np.inf,
@@ -242,7 +244,7 @@ def _cast_rays(value, robots, alive, obstacles, rays, responses, share):
 @kernel()
 def _turn(rays, heading):
     """Rotate the ray directions of a robot into the arena's frame."""
-    c, s = np.cos(heading), np.sin(heading)
+    c, s = math_compiled.cos(heading), math_compiled.sin(heading)
     for ray in range(len(rays.dx)):
         rays.dx[ray] = c * rays.cos[ray] - s * rays.sin[ray]
         rays.dy[ray] = s * rays.cos[ray] + c * rays.sin[ray]

@@ -11,6 +11,7 @@ from swarmwire.comms.base.geometry.obstacle_index import obstacles_near
 from swarmwire.comms.base.geometry.obstacles import ray_to_circle, ray_to_polygon
 from swarmwire.comms.base.geometry.robot_index import sort
 from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.robot.sensors.scan import ScanSpec
 from swarmwire.world.sensors.rays import near_robots, nearest, obstacle_indices_of, robot_index_of
 from swarmwire.world.sensors.sensor import BuiltInSensor
@@ -77,7 +78,12 @@ def _scan(near, robots, obstacles, laser):
         for i in range(near.shape[1]):
             robot, rays = laser.first + i, near[arena, i]
             heading = robots.state[arena, robot, 2]
-            c, s, low, high = np.cos(heading), np.sin(heading), robots.bottom_m[robot], robots.top_m[robot]
+            c, s, low, high = (
+                math_compiled.cos(heading),
+                math_compiled.sin(heading),
+                robots.bottom_m[robot],
+                robots.top_m[robot],
+            )
             x = robots.state[arena, robot, 0] + laser.offset_m * c
             y = robots.state[arena, robot, 1] + laser.offset_m * s
             x = nearest(0.0, x, robots.wrap_x, robots.per_wrap_x)
@@ -122,8 +128,8 @@ def _hit_disc(rays, pose, laser, cx, cy, radius):
     distance = np.sqrt(ox * ox + oy * oy)
     right, width = 0.0, TURN_RAD
     if distance > radius:
-        half = np.arcsin(radius / distance)
-        right, width = np.arctan2(oy, ox) - half, 2.0 * half
+        half = math_compiled.asin(radius / distance)
+        right, width = math_compiled.atan2(oy, ox) - half, 2.0 * half
     for past_last in range(2):
         first, stop = _span(right - heading, width, past_last, laser)
         for ray in range(first, stop):
@@ -169,5 +175,5 @@ def _apparent_width(x, y, obstacles, k):
             left_x, left_y = cx, cy
     if not outside:
         return 0.0, TURN_RAD
-    width = np.arctan2(right_x * left_y - right_y * left_x, right_x * left_x + right_y * left_y)
-    return np.arctan2(right_y, right_x), abs(width)
+    width = math_compiled.atan2(right_x * left_y - right_y * left_x, right_x * left_x + right_y * left_y)
+    return math_compiled.atan2(right_y, right_x), abs(width)

@@ -5,12 +5,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, KeyArray
 from swarmwire.comms.base.draws import normal as normals
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal
 from swarmwire.comms.base.geometry.ground import shade_at
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.robot.sensors.sensor import Field
 from swarmwire.comms.robot.sensors.simple import (
     BatterySpec,
@@ -77,7 +79,7 @@ class FlowSensor(BuiltInSensor[FlowSpec]):
         """Return the velocity of every robot of the group."""
         state = self.scene.state[:, self.group.start : self.group.stop]
         heading, vx, vy = state[:, :, 2], state[:, :, 3], state[:, :, 4]
-        cos, sin = np.cos(heading), np.sin(heading)
+        cos, sin = portable.cos(heading), portable.sin(heading)
         return cos * vx + sin * vy, cos * vy - sin * vx
 
 
@@ -170,7 +172,7 @@ def _look_down(shade: AnyArray, state: AnyArray, running: AnyArray, start: Any, 
             continue
         for i in range(shade.shape[1]):
             x, y, heading = state[arena, start + i, 0], state[arena, start + i, 1], state[arena, start + i, 2]
-            c, s = np.cos(heading), np.sin(heading)
+            c, s = math_compiled.cos(heading), math_compiled.sin(heading)
             for k in range(len(points)):
                 ahead, left = points[k, 0], points[k, 1]
                 shade[arena, i, k] = shade_at(ground, x + c * ahead - s * left, y + s * ahead + c * left)

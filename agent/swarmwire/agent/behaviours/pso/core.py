@@ -10,6 +10,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.fields import Vectors
 from swarmwire.agent.parameters import BadParameter, PerRobot, parameters_of
 from swarmwire.agent.robots import Robots
@@ -86,7 +87,7 @@ def update_personal_best(memory: Particle, brightness: FloatArray, again_m: floa
 
     A reading nearer than `again_m` to the personal best is one more of it: it enters the mean, and the position stays.
     """
-    again = (memory.personal_readings > 0) & (np.hypot(memory.personal_x, memory.personal_y) < again_m)
+    again = (memory.personal_readings > 0) & (portable.hypot(memory.personal_x, memory.personal_y) < again_m)
     memory.personal_readings[again] += 1
     difference = brightness - memory.personal_brightness
     memory.personal_brightness[again] += (difference / np.maximum(memory.personal_readings, 1))[again]
@@ -175,7 +176,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
     def step(self, robots: Robots, memory: P) -> None:
         """Update both bests; update the velocity or send the personal best if due; drive towards the target."""
         shift(memory, self.moved(robots, memory))
-        update_personal_best(memory, np.add.reduce(robots.light.value, 1), self.again_m)
+        update_personal_best(memory, portable.ordered_sum(robots.light.value), self.again_m)
         update_neighbour_best(memory, self._from_neighbours(self.received_bests(robots)))
         self._update(robots, memory, memory.steps % self.update_every_ticks == 0)
         self.send_best(robots, memory, (memory.steps + self.tell_before_ticks) % self.update_every_ticks == 0)
@@ -198,7 +199,7 @@ class ParticleSwarm(VectorAgent[P], Generic[P]):
         best_y = np.where(brighter, memory.neighbour_y, memory.personal_y)
         x = self._velocity(robots, "x", max_step_m, memory.steps, memory.velocity_x, memory.personal_x, best_x)
         y = self._velocity(robots, "y", max_step_m, memory.steps, memory.velocity_y, memory.personal_y, best_y)
-        scale = np.minimum(1.0, max_step_m / np.maximum(np.hypot(x, y), 1e-9))
+        scale = np.minimum(1.0, max_step_m / np.maximum(portable.hypot(x, y), 1e-9))
         memory.velocity_x[due] = memory.target_x[due] = (x * scale)[due]
         memory.velocity_y[due] = memory.target_y[due] = (y * scale)[due]
         robots.note("to its own best", due & ~brighter)

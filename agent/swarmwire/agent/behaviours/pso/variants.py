@@ -8,6 +8,7 @@ from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 
+from swarmwire.agent import portable
 from swarmwire.agent.behaviours.pso.core import Bests, Particle, ParticleSwarm
 from swarmwire.agent.fields import Vectors, along, repulsion_of_rays
 from swarmwire.agent.robots import Robots
@@ -70,11 +71,11 @@ class WheeledSwarm(ParticleSwarm[P], Generic[P]):
 
     def head_for_target(self, robots: Robots, memory: P) -> None:
         """Drive towards the target, and away from near objects."""
-        bearing = np.arctan2(memory.target_y, memory.target_x) - robots.compass.heading_rad
-        attraction = np.where(np.hypot(memory.target_x, memory.target_y) < self.arrived_m, 0.0, 1.0)
+        bearing = portable.atan2(memory.target_y, memory.target_x) - robots.compass.heading_rad
+        attraction = np.where(portable.hypot(memory.target_x, memory.target_y) < self.arrived_m, 0.0, 1.0)
         desired = attraction * along(bearing) + self.avoidance * repulsion_of_rays(robots.proximity)
         angle, strength = desired.angle_rad, np.minimum(desired.length, 1.0)
-        linear = self.speed_mps * strength * np.maximum(np.cos(angle), 0.0)
+        linear = self.speed_mps * strength * np.maximum(portable.cos(angle), 0.0)
         robots.drive(linear_mps=linear, angular_radps=self.turn_gain_per_s * strength * angle)
 
 
@@ -91,10 +92,12 @@ class PsoModel(PositionedSwarm):
 
     def head_for_target(self, robots: Robots, memory: PositionedParticle) -> None:
         """Drive straight to the target, in any direction, without overshoot."""
-        distance = np.hypot(memory.target_x, memory.target_y)
-        bearing = np.arctan2(memory.target_y, memory.target_x) - robots.compass.heading_rad
+        distance = portable.hypot(memory.target_x, memory.target_y)
+        bearing = portable.atan2(memory.target_y, memory.target_x) - robots.compass.heading_rad
         speed = np.minimum(self.speed_mps, distance / robots.period_s)
-        robots.drive(linear_mps=speed * np.cos(bearing), angular_radps=0.0, lateral_mps=speed * np.sin(bearing))
+        robots.drive(
+            linear_mps=speed * portable.cos(bearing), angular_radps=0.0, lateral_mps=speed * portable.sin(bearing)
+        )
 
 
 class BestVector(Message):

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import ByteArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.floor import Floor
 from swarmwire.comms.base.geometry.obstacles import sides_of
@@ -36,7 +37,7 @@ def ground_of(floor: Floor | None, size_m: tuple[float, float], boundary: Bounda
         radius_m = patch.radius_m
         if patch.shape == "polygon":
             corners = np.array(patch.points_m, np.float64)
-            radius_m = np.hypot(*corners.T).max()
+            radius_m = portable.hypot(*corners.T).max()
             sides.append(sides_of(corners))
         patches.append((patch.x_m, patch.y_m, radius_m, patch.shade))
         side_start.append(side_start[-1] + len(patch.points_m))

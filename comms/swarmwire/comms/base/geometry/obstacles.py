@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
@@ -56,8 +57,8 @@ def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
                 circles.append((o.x_m, o.y_m, o.radius_m))
                 continue
             corners = o.corners_m
-            centre = corners.mean(axis=0)
-            polygons.append((*centre, np.hypot(*(corners - centre).T).max()))
+            centre = portable.ordered_sum(corners.T) / len(corners)
+            polygons.append((*centre, portable.hypot(*(corners - centre).T).max()))
             sides.append(sides_of(corners))
             side_start.append(side_start[-1] + len(corners))
         circle_start.append(len(circles))

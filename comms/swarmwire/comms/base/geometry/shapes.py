@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import FloatArray
 
 Boundary = Literal["walls", "open", "torus"]  # at the arena's edge: walls, nothing, or the opposite edge
@@ -40,6 +41,6 @@ class Obstacle:
         along, across = 0.5 * self.size_m[0], 0.5 * self.size_m[1]
         box = ((-along, -across), (along, -across), (along, across), (-along, across))
         points = np.array(box if self.shape == "box" else self.points_m, np.float64).reshape(-1, 2)
-        c, s = np.cos(self.heading_rad), np.sin(self.heading_rad)
+        c, s = portable.cos(self.heading_rad), portable.sin(self.heading_rad)
         x, y = points[:, 0], points[:, 1]
         return np.stack([self.x_m + (c * x - s * y), self.y_m + (s * x + c * y)], axis=1)

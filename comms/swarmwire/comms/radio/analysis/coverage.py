@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
@@ -237,7 +238,7 @@ def _links(
     keys = np.array(key, np.uint64)
     x, y, turn = (uniform(keys, np.arange(CANDIDATES), distance_index, axis, SURVEY) for axis in range(3))
     start = (np.stack([x, y], axis=1) - 0.5) * size_m
-    direction = np.stack([np.cos(2.0 * np.pi * turn), np.sin(2.0 * np.pi * turn)], axis=1)
+    direction = np.stack([portable.cos(2.0 * np.pi * turn), portable.sin(2.0 * np.pi * turn)], axis=1)
     end = start + distance_m * direction
     fits = np.flatnonzero((np.abs(end) <= 0.5 * np.array(size_m)).all(axis=1))
     fits = fits[coverage.is_free(start[fits]) & coverage.is_free(end[fits])][:MAX_LINKS]

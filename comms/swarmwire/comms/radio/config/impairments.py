@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
 
@@ -123,7 +124,7 @@ def bursts_from_steps(
     p and r are the probabilities from one packet to the next that good turns bad and bad turns good, p + r < 1:
     (a + b) interval = -ln(1 - p - r), and a / b = p / r.
     """
-    relaxation_s = -interval_s / math.log1p(-(p + r))
+    relaxation_s = -interval_s / portable.log1p(-(p + r))
     return Bursts(relaxation_s * (p + r) / r, relaxation_s * (p + r) / p, loss_bad, loss_good, symmetric)
 
 

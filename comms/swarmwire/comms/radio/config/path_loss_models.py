@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.config import parameter
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
@@ -30,7 +31,7 @@ def straight(loss_db_at_1_m: float, slope_db: float, absorption_db_per_m: float 
 
 def loss_at_1_m_db(frequency_hz: float) -> float:
     """Free-space loss over 1 m, in dB: 20 log10(4 pi f / c)."""
-    return 20.0 * math.log10(4.0 * math.pi * frequency_hz / SPEED_OF_LIGHT_MPS)
+    return 20.0 * portable.log10(4.0 * math.pi * frequency_hz / SPEED_OF_LIGHT_MPS)
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class TwoRay:
 
     def curve(self, frequency_hz: float) -> LossCurve:
         """Return the loss at this frequency."""
-        ground_db = -20.0 * math.log10(self.sender_height_m * self.receiver_height_m)
+        ground_db = -20.0 * portable.log10(self.sender_height_m * self.receiver_height_m)
         return LossCurve(loss_at_1_m_db(frequency_hz), 20.0, self.crossover_m(frequency_hz), ground_db, 40.0)
 
 
@@ -114,4 +115,4 @@ class ItuIndoor:
         slope_db = self.distance_coefficient_db
         if slope_db is None:
             slope_db = BUILDINGS[self.building][0]
-        return straight(20.0 * math.log10(frequency_hz / 1e6) + self.floor_loss_db() - 28.0, slope_db)
+        return straight(20.0 * portable.log10(frequency_hz / 1e6) + self.floor_loss_db() - 28.0, slope_db)

@@ -3,13 +3,13 @@
 No kernels: a scenario is read without a compiler.
 """
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
@@ -200,7 +200,7 @@ ROOM_K = 290.0  # the temperature at which noise figures are defined (IEEE)
 
 def noise_dbm(bandwidth_hz: float, noise_figure_db: float = 0.0) -> float:
     """Noise power k T B F in dBm: -173.975 dBm in 1 Hz at 290 K, plus the receiver's noise figure."""
-    return 10.0 * math.log10(1e3 * BOLTZMANN_J_PER_K * ROOM_K * bandwidth_hz) + noise_figure_db
+    return 10.0 * portable.log10(1e3 * BOLTZMANN_J_PER_K * ROOM_K * bandwidth_hz) + noise_figure_db
 
 
 @dataclass(frozen=True)

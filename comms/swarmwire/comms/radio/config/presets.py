@@ -3,10 +3,11 @@
 A preset fills in the keys that a scenario leaves out, also within tables.
 """
 
-import math
 from collections.abc import Mapping
 from copy import deepcopy
 from typing import Any, NamedTuple, cast
+
+from swarmwire.comms.base import math as portable
 
 
 class Preset(NamedTuple):
@@ -32,7 +33,7 @@ def fsk_success() -> dict[str, Any]:
     and a bandwidth equal to the bit rate, SINR is Eb/N0.
     """
     sinr_db = [STEP_DB * row for row in range(round(MAX_FSK_DB / STEP_DB) + 1)]
-    success = [round(1.0 - 0.5 * math.exp(-0.5 * 10.0 ** (0.1 * db)), DIGITS) for db in sinr_db]
+    success = [round(1.0 - 0.5 * portable.exp(-0.5 * portable.power(10.0, 0.1 * db)), DIGITS) for db in sinr_db]
     return {"sinr_db": sinr_db, "success": success, "frame_bits": 1}
 
 

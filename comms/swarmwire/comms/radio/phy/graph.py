@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.radio import Radio
@@ -75,7 +76,10 @@ class RadioGraph:
         """
         noise_mw = self._params.noise_mw
         steady_mw, all_mw, clear = self._jam.by_robot(NEGLIGIBLE_POWER_RATIO * noise_mw)
-        steady_db, all_db = 10.0 * np.log10(1.0 + steady_mw / noise_mw), 10.0 * np.log10(1.0 + all_mw / noise_mw)
+        steady_db, all_db = (
+            10.0 * portable.log10(1.0 + steady_mw / noise_mw),
+            10.0 * portable.log10(1.0 + all_mw / noise_mw),
+        )
         worse = np.full(len(pairs.a), np.inf)
         directions = (pairs.a, pairs.b), (pairs.b, pairs.a)
         for mean_dbm, (sender, receiver) in zip(self._links.mean_dbm(pairs), directions, strict=True):

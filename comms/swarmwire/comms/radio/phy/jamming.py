@@ -6,14 +6,13 @@ current poses; within a tick jammers only switch on and off.
 
 # pyright: basic, reportUnknownMemberType=false
 
-import math
-
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Jammers
 from swarmwire.comms.radio.phy import dcf
@@ -97,7 +96,7 @@ def _powers(jammers, position, x, y, robots, obstacles, propagation):
                 continue
             if propagation.line_of_sight and is_blocked(obstacles, arena, jx, jy, x[r], y[r], 0.0, 0.0):
                 continue
-            distance_m = math.hypot(x[r] - jx, y[r] - jy)
+            distance_m = math_compiled.hypot(x[r] - jx, y[r] - jy)
             loss = loss_between_db(mean_loss, waves, obstacles, entered, arena, distance_m, jx, jy, x[r], y[r])
             power_mw[j, i] = from_db(jammers.power_dbm[j] + propagation.receive_dbi[r] - loss)
     return power_mw

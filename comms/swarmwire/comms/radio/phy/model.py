@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
@@ -66,7 +67,7 @@ class Reporter:
         )
         packets = Transmissions(table, Payloads(data, offset))
         with np.errstate(divide="ignore"):
-            rssi_dbm = 10.0 * np.log10(power_mw)
+            rssi_dbm = 10.0 * portable.log10(power_mw)
         links = Links(link_table, rssi_dbm, np.zeros((len(rssi_dbm), self._columns)))
         if np.count_nonzero(packets.fate != UNDER_WAY):
             links.in_range[len(row_of) :] = self._count_in_range(packets, liveness)

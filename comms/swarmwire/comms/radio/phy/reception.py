@@ -7,14 +7,13 @@ interfere (access "none"), a receiver receives each frame as if it were alone.
 
 # pyright: basic, reportUnknownMemberType=false
 
-import math
-
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy import dcf
@@ -66,9 +65,9 @@ def _table(receiver, sinr):
     for i in range(len(out)):
         chunk, bit = chunk_success(receiver, sinr[i], CHUNK_BITS), chunk_success(receiver, sinr[i], 1.0)
         if chunk > 0.1:
-            out[i] = math.log(chunk) / CHUNK_BITS
+            out[i] = math_compiled.log(chunk) / CHUNK_BITS
         else:
-            out[i] = max(math.log(bit), LOG_NEVER) if bit > 0.0 else LOG_NEVER
+            out[i] = max(math_compiled.log(bit), LOG_NEVER) if bit > 0.0 else LOG_NEVER
     return out
 
 
@@ -97,10 +96,10 @@ def fate_of_frame(params, losses, state, s, i, frame_log_success):
     else:
         sequence, attempt, draw_purpose = state.packet[sender.packet].sequence, sender.attempt, RECEPTION
     u = uniform(key, a, b, sequence, draw_purpose + attempt)
-    if u >= math.exp(frame_log_success):
-        if u < math.exp(frame_log_success + state.reception[receiver].jam_log):
+    if u >= math_compiled.exp(frame_log_success):
+        if u < math_compiled.exp(frame_log_success + state.reception[receiver].jam_log):
             return JAMMED
-        alone = math.exp(alone_log_success(params, state.link[i].power_mw, sender.bits, is_ack))
+        alone = math_compiled.exp(alone_log_success(params, state.link[i].power_mw, sender.bits, is_ack))
         return COLLIDED if u < alone else TOO_WEAK
     frame = ReceivedFrame(key, s, receiver, a, b, sequence, attempt, is_ack, sender.on_air_ns, losses.trace_ns)
     return frame_fate(losses, frame)
@@ -120,7 +119,7 @@ def alone_log_success(params, power_mw, bits, is_ack):
 @kernel(from_python=True)
 def lone_delivery(params, mean_dbm, bits):
     """Return the success probability of a lone frame of `bits` bits at this power."""
-    return math.exp(alone_log_success(params, from_db(mean_dbm), bits, False))
+    return math_compiled.exp(alone_log_success(params, from_db(mean_dbm), bits, False))
 
 
 @njit()

@@ -26,6 +26,7 @@ from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS
 from swarmwire.comms.radio.config.phy import FADINGS, Fading
 from swarmwire.comms.radio.propagation.shadowing import SUMS, cosine, sine, total
@@ -52,7 +53,7 @@ def gamma_tails(shape: Any, x: float):
     """
     if x <= 0.0:
         return 0.0, 1.0
-    scale = math.exp(shape * math.log(x) - x - math.lgamma(shape))
+    scale = math_compiled.exp(shape * math_compiled.log(x) - x - math_compiled.log_gamma(shape))
     if x < shape + 1.0:
         term = 1.0 / shape
         below = term
@@ -93,7 +94,7 @@ def gamma_quantile(shape: Any, below: Any, above: Any):
         return math.inf
     low, high = 0.0, math.inf
     x = _first_guess(shape, below, above)
-    log_scale = math.lgamma(shape)
+    log_scale = math_compiled.log_gamma(shape)
     for _ in range(MAX_STEPS):
         below_x, above_x = gamma_tails(shape, x)
         excess = below_x - below if below < above else above - above_x
@@ -101,7 +102,7 @@ def gamma_quantile(shape: Any, below: Any, above: Any):
             high = x
         else:
             low = x
-        density = math.exp((shape - 1.0) * math.log(x) - x - log_scale)
+        density = math_compiled.exp((shape - 1.0) * math_compiled.log(x) - x - log_scale)
         step = excess / density if density > 0.0 else math.inf
         curvature = (shape - 1.0) / x - 1.0
         x_next = x - step / (1.0 - 0.5 * min(1.0, step * curvature))
@@ -117,17 +118,17 @@ def gamma_quantile(shape: Any, below: Any, above: Any):
 def _first_guess(shape: Any, below: Any, above: Any):
     """Return a guess: a normal quantile above shape 1 (Wilson and Hilferty, 1931), the ends' asymptotes below."""
     if shape > 1.0:
-        t = math.sqrt(-2.0 * math.log(min(below, above)))
+        t = math.sqrt(-2.0 * math_compiled.log(min(below, above)))
         z = t - (2.30753 + t * 0.27061) / (1.0 + t * (0.99229 + t * 0.04481))  # Abramowitz and Stegun 26.2.22
         z = -z if below < above else z
         root = 1.0 - 1.0 / (9.0 * shape) + z / (3.0 * math.sqrt(shape))
         if root > 0.1:
             return shape * root**3
-        return math.exp((math.log(below) + math.lgamma(shape + 1.0)) / shape)
+        return math_compiled.exp((math_compiled.log(below) + math_compiled.log_gamma(shape + 1.0)) / shape)
     split = 1.0 - shape * (0.253 + shape * 0.12)
     if below < split:
-        return max((below / split) ** (1.0 / shape), SMALLEST)
-    return 1.0 - math.log(above / (1.0 - split))
+        return max(math_compiled.power(below / split, 1.0 / shape), SMALLEST)
+    return 1.0 - math_compiled.log(above / (1.0 - split))
 
 
 @njit()
@@ -141,7 +142,7 @@ def nakagami_gain(rayleigh_gain: Any, m: float):
     """
     if m == 1.0:
         return rayleigh_gain
-    return gamma_quantile(m, -math.expm1(-rayleigh_gain), math.exp(-rayleigh_gain)) / m
+    return gamma_quantile(m, -math_compiled.expm1(-rayleigh_gain), math_compiled.exp(-rayleigh_gain)) / m
 
 
 @njit()

@@ -11,6 +11,7 @@ import math
 from typing import Any, NamedTuple
 
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.radio.config.path_loss_models import LossCurve
 from swarmwire.comms.radio.propagation.obstruction import wall_loss_db
 from swarmwire.comms.radio.propagation.shadowing import shadowing_db
@@ -25,8 +26,8 @@ def loss_db(curve: Any, distance_m: Any):
     distance_m = max(distance_m, NEAREST_M)
     absorbed_db = curve.absorption_db_per_m * distance_m
     if distance_m <= curve.break_m:
-        return curve.near_db + curve.near_slope_db * math.log10(distance_m) + absorbed_db
-    return curve.far_db + curve.far_slope_db * math.log10(distance_m) + absorbed_db
+        return curve.near_db + curve.near_slope_db * math_compiled.log10(distance_m) + absorbed_db
+    return curve.far_db + curve.far_slope_db * math_compiled.log10(distance_m) + absorbed_db
 
 
 @njit()
@@ -49,10 +50,10 @@ def reach_m(curve: Any, max_loss_db: float):
 
 @njit()
 def _reach_without_absorption_m(curve: Any, max_loss_db: float):
-    near_m = 10.0 ** ((max_loss_db - curve.near_db) / curve.near_slope_db)
+    near_m = math_compiled.power(10.0, (max_loss_db - curve.near_db) / curve.near_slope_db)
     if near_m <= curve.break_m:
         return near_m
-    far_m = 10.0 ** ((max_loss_db - curve.far_db) / curve.far_slope_db)
+    far_m = math_compiled.power(10.0, (max_loss_db - curve.far_db) / curve.far_slope_db)
     return max(far_m, curve.break_m)
 
 

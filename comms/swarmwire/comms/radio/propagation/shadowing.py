@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import AnyArray, FloatArray, KeyArray
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.kernels import kernel, njit
@@ -71,9 +72,11 @@ def field_waves(keys: KeyArray, shadowing: Shadowing) -> FloatArray:
     """Return the waves of each arena's field (arenas, 3, WAVES): k_x and k_y in cycles per m, phase in turns."""
     key, wave = keys[:, None], np.arange(WAVES)
     quantile = (wave + uniform(key, wave, QUANTILE, 0, SHADOWING)) / WAVES
-    k = np.sqrt((1.0 - quantile) ** -2 - 1.0) / (2.0 * np.pi * shadowing.correlation_m)
+    k = np.sqrt(1.0 / ((1.0 - quantile) * (1.0 - quantile)) - 1.0) / (2.0 * np.pi * shadowing.correlation_m)
     direction = 2.0 * np.pi * (wave * GOLDEN + uniform(key, 0, TURN, 0, SHADOWING))
-    return np.stack([k * np.cos(direction), k * np.sin(direction), uniform(key, wave, PHASE, 0, SHADOWING)], axis=1)
+    return np.stack(
+        [k * portable.cos(direction), k * portable.sin(direction), uniform(key, wave, PHASE, 0, SHADOWING)], axis=1
+    )
 
 
 def amplitude_db(shadowing: Shadowing) -> float:

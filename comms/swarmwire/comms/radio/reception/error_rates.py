@@ -11,6 +11,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.timing import OFDM_BITS_PER_SYMBOL
 
@@ -22,7 +23,7 @@ def all_right(error_rate: float, bits: Any):
         return 1.0
     if error_rate >= 1.0:
         return 0.0
-    return math.exp(bits * math.log1p(-error_rate))
+    return math_compiled.exp(bits * math_compiled.log1p(-error_rate))
 
 
 # IEEE 802.15.4 at 2.4 GHz: O-QPSK, one of sixteen spread symbols per four bits (250 kbit/s).
@@ -40,7 +41,7 @@ def oqpsk_bit_errors(sinr: Any):
     """
     total = 0.0
     for i in range(15):
-        total += _TERMS[i] * math.exp(20.0 * sinr * (1.0 / (i + 2) - 1.0))
+        total += _TERMS[i] * math_compiled.exp(20.0 * sinr * (1.0 / (i + 2) - 1.0))
     return min(max(total * 8.0 / 15.0 / 16.0, 0.0), 0.5)
 
 
@@ -67,7 +68,7 @@ HALF_WIDTH = 6.0
 @njit()
 def dbpsk_bit_errors(sinr: Any):
     """Return the BER at 1 Mbit/s: 1/2 exp(-Eb/N0), Eb/N0 = SINR 22 MHz / 1 Mbit/s."""
-    return 0.5 * math.exp(-22.0 * sinr)
+    return 0.5 * math_compiled.exp(-22.0 * sinr)
 
 
 @njit()
@@ -76,7 +77,7 @@ def dqpsk_bit_errors(sinr: Any):
     x = 11.0 * sinr
     if x <= 0.0:
         return 0.5
-    return min((SQRT2 + 1.0) / math.sqrt(8.0 * math.pi * SQRT2 * x) * math.exp(-(2.0 - SQRT2) * x), 0.5)
+    return min((SQRT2 + 1.0) / math.sqrt(8.0 * math.pi * SQRT2 * x) * math_compiled.exp(-(2.0 - SQRT2) * x), 0.5)
 
 
 @njit()
@@ -91,10 +92,10 @@ def biorthogonal_errors(signal: Any):
     missing = 0.0
     for i in range(len(_NODES)):
         y = low + 0.5 * (high - low) * (_NODES[i] + 1.0)
-        not_all_lower = -math.expm1(7.0 * math.log1p(-math.erfc(y / SQRT2)))
-        missing += _WEIGHTS[i] * not_all_lower * math.exp(-0.5 * (y - signal) ** 2)
+        not_all_lower = -math_compiled.expm1(7.0 * math_compiled.log1p(-math_compiled.erfc(y / SQRT2)))
+        missing += _WEIGHTS[i] * not_all_lower * math_compiled.exp(-0.5 * (y - signal) ** 2)
     missing *= 0.5 * (high - low) / math.sqrt(2.0 * math.pi)
-    return min(missing + 0.5 * math.erfc(signal / SQRT2), 1.0)
+    return min(missing + 0.5 * math_compiled.erfc(signal / SQRT2), 1.0)
 
 
 @njit()
@@ -153,11 +154,11 @@ def raw_bit_errors(points: Any, sinr: Any):
     (L - 1) / (L log2 L) erfc(sqrt(3 s / (2 (M - 1)))).
     """
     if points == 2:
-        return 0.5 * math.erfc(math.sqrt(sinr))
+        return 0.5 * math_compiled.erfc(math.sqrt(sinr))
     if points == 4:
-        return 0.5 * math.erfc(math.sqrt(0.5 * sinr))
+        return 0.5 * math_compiled.erfc(math.sqrt(0.5 * sinr))
     side = math.sqrt(points)
-    return (side - 1.0) / (side * math.log2(side)) * math.erfc(math.sqrt(1.5 * sinr / (points - 1.0)))
+    return (side - 1.0) / (side * math_compiled.log2(side)) * math_compiled.erfc(math.sqrt(1.5 * sinr / (points - 1.0)))
 
 
 @njit()
@@ -168,9 +169,9 @@ def bit_affinity(points: Any, sinr: Any):
     differ adds 2 / (L log2 L) exp(-3 s / (2 (M - 1))); points farther apart are neglected.
     """
     if points == 2:
-        return math.exp(-sinr)
+        return math_compiled.exp(-sinr)
     side = math.sqrt(points)
-    return 2.0 * (side - 1.0) / (side * math.log2(side)) * math.exp(-1.5 * sinr / (points - 1.0))
+    return 2.0 * (side - 1.0) / (side * math_compiled.log2(side)) * math_compiled.exp(-1.5 * sinr / (points - 1.0))
 
 
 @njit()
@@ -180,10 +181,10 @@ def ofdm_path_errors(rate: int, sinr: float):
     1 / k sum a_d Q(sqrt(-2 d ln B)): a_d paths of weight d, k bits in a period of the punctured code, B the
     `bit_affinity` (A. Martinez, A. Guillen i Fabregas, G. Caire, IEEE Trans. Inf. Theory 52, 2006); at most 1.
     """
-    code, exponent = _CODE[rate], -math.log(max(bit_affinity(_POINTS[rate], sinr), 1e-300))
+    code, exponent = _CODE[rate], -math_compiled.log(max(bit_affinity(_POINTS[rate], sinr), 1e-300))
     weight, total = _FIRST[code], 0.0
     for i in range(10):
-        total += _PATHS[code, i] * 0.5 * math.erfc(math.sqrt(weight * exponent))
+        total += _PATHS[code, i] * 0.5 * math_compiled.erfc(math.sqrt(weight * exponent))
         weight += _STEP[code]
     return min(total, 1.0)
 
@@ -219,7 +220,7 @@ def nist_success(rate: int, sinr: float, bits: Any):
 @njit()
 def gazebo_success(sinr: Any, bits: Any):
     """Return success as gz-sim and SubT compute it: erfc(sqrt(SINR)) is the loss of a byte, not of a bit."""
-    return all_right(math.erfc(math.sqrt(sinr)), bits / 8.0)
+    return all_right(math_compiled.erfc(math.sqrt(sinr)), bits / 8.0)
 
 
 @njit()
@@ -240,7 +241,7 @@ def table_success(sinr_db: AnyArray, success: AnyArray, frame_bits: Any, sinr: A
             i += 1
         share = (at_db - sinr_db[i]) / (sinr_db[i + 1] - sinr_db[i])
         frame_success = success[i] + share * (success[i + 1] - success[i])
-    return 1.0 if bits <= 0.0 else frame_success ** (bits / frame_bits)
+    return 1.0 if bits <= 0.0 else math_compiled.power(frame_success, bits / frame_bits)
 
 
 @njit()

@@ -21,6 +21,7 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.context import ChannelContext
@@ -47,7 +48,7 @@ def bad_after(was_bad, dt_s, a, b, u):
     elapsed = (a + b) * dt_s
     if elapsed >= FORGOTTEN:
         return u < share
-    return u < share + ((1.0 if was_bad else 0.0) - share) * math.exp(-elapsed)
+    return u < share + ((1.0 if was_bad else 0.0) - share) * math_compiled.exp(-elapsed)
 
 
 class BurstParams(NamedTuple):

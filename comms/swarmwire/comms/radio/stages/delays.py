@@ -8,11 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal_quantile
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import RECEIVED, Links
@@ -47,11 +49,13 @@ def delay_distribution(delays: Delays) -> DelayDistribution:
         half_s = math.sqrt(3.0) * deviation_s
         return DelayDistribution(kind, mean_s - half_s, 2.0 * half_s, 0.0)
     if kind == NORMAL:
-        return DelayDistribution(kind, mean_s, deviation_s, 0.5 * math.erfc(mean_s / (deviation_s * math.sqrt(2.0))))
+        return DelayDistribution(
+            kind, mean_s, deviation_s, 0.5 * portable.erfc(mean_s / (deviation_s * math.sqrt(2.0)))
+        )
     if kind == LOGNORMAL:
-        variance = math.log1p((deviation_s / mean_s) ** 2)
-        return DelayDistribution(kind, math.log(mean_s) - 0.5 * variance, math.sqrt(variance), 0.0)
-    shape = 1.0 + math.sqrt(1.0 + (mean_s / deviation_s) ** 2)
+        variance = portable.log1p((deviation_s / mean_s) * (deviation_s / mean_s))
+        return DelayDistribution(kind, portable.log(mean_s) - 0.5 * variance, math.sqrt(variance), 0.0)
+    shape = 1.0 + math.sqrt(1.0 + (mean_s / deviation_s) * (mean_s / deviation_s))
     return DelayDistribution(kind, mean_s * (shape - 1.0) / shape, -1.0 / shape, 0.0)
 
 
@@ -67,9 +71,9 @@ def varying_delay_ns(params: Any, u: float):
         z = -normal_quantile(above) if above < 0.5 else normal_quantile(max(below, SMALLEST_TAIL))
         delay_s = max(params.first + params.second * z, 0.0)
     elif params.distribution == LOGNORMAL:
-        delay_s = math.exp(params.first + params.second * normal_quantile(u + SMALLEST_TAIL))
+        delay_s = math_compiled.exp(params.first + params.second * normal_quantile(u + SMALLEST_TAIL))
     else:
-        delay_s = params.first * (1.0 - u) ** params.second
+        delay_s = params.first * math_compiled.power(1.0 - u, params.second)
     return int(min(delay_s * NS_PER_S, MAX_NS))
 
 

@@ -10,6 +10,7 @@ from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.stages.link_draws import LinkDraws, normal_of_link
@@ -104,7 +105,7 @@ def measure_bearing(
     for i in range(len(out_rad)):
         if links.fate[i] == RECEIVED:
             dx, dy = to_sender_m(pose, links.sender[i], links.receiver[i], wrap_m)
-            bearing = np.arctan2(dy, dx) - pose[links.receiver[i], 2]
+            bearing = math_compiled.atan2(dy, dx) - pose[links.receiver[i], 2]
             if noise_rad > 0.0:
                 bearing += noise_rad * normal_of_link(draws, links, i, BEARING_NOISE)
             out_rad[i] = wrap(bearing)

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.config import parameter
 
@@ -135,7 +136,7 @@ class Leds:
         angle, ring_m = np.deg2rad(self.angles_deg), self.radius_m or body_radius_m
         position = np.zeros((self.count, 3))
         ring, beacon = position[: len(angle)], position[len(angle) :]
-        ring[:, 0], ring[:, 1], ring[:, 2] = ring_m * np.cos(angle), ring_m * np.sin(angle), self.height_m
+        ring[:, 0], ring[:, 1], ring[:, 2] = ring_m * portable.cos(angle), ring_m * portable.sin(angle), self.height_m
         beacon[:, 2] = self.beacon_height_m
         return position
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar, cast
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.angles import wrap_by_atan2
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
@@ -40,7 +41,7 @@ class RadialSpec(RangedSensorSpec):
     @cached_property
     def direction(self) -> FloatArray:
         """Cosine and sine of `angle_rad`, (sensors, 2)."""
-        return np.stack([np.cos(self.angle_rad), np.sin(self.angle_rad)], 1)
+        return np.stack([portable.cos(self.angle_rad), portable.sin(self.angle_rad)], 1)
 
     @cached_property
     def direction_lists(self) -> tuple[list[float], list[float]]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.sensors.rays import ray_directions
@@ -78,7 +79,7 @@ class ScanSpec(RangedSensorSpec):
     @cached_property
     def direction(self) -> tuple[FloatArray, FloatArray]:
         """Cosine and sine of `angle_rad`, (rays,) each."""
-        return np.cos(self.angle_rad), np.sin(self.angle_rad)
+        return portable.cos(self.angle_rad), portable.sin(self.angle_rad)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ They suffice to repeat a run, also a killed one, without the original scenario.
 
 Other bodies come with swarmwire, and the digests of its parts cover them. An agent file is loaded without its folder on
 `sys.path`, so it can import no neighbour. Installed modules are not copied; their digests are recorded (`modules`).
-Equal trajectory hashes are promised only for one CPU type, and the same code and versions.
+Equal trajectory hashes are promised for the same code and versions, on any machine; with the pymunk engine on one CPU
+type.
 """
 
 import hashlib
@@ -57,7 +58,7 @@ class RunFacts:
 
     def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
         """Return the differences between then and now, one line each; `code` has the specs of users' classes."""
-        return [*changed_files(self.files, folder), *changes_since(self.modules, self.versions, self.cpu, code)]
+        return [*changed_files(self.files, folder), *changes_since(self.modules, self.versions, code)]
 
     def write(self, folder: Path) -> None:
         """Write `run.json` into the run folder."""
@@ -113,10 +114,8 @@ def module_digests(specs: Iterable[str]) -> dict[str, str]:
     return {part: _digest_once(part) for part in PARTS} | {name: _digest(name) for name in sorted(packages - {*PARTS})}
 
 
-def changes_since(
-    modules_then: Mapping[str, str], versions_then: Mapping[str, str], cpu_then: str, code: Iterable[str]
-) -> list[str]:
-    """Return the differences from these digests, versions and CPU, one line each; `code`: specs of users' classes."""
+def changes_since(modules_then: Mapping[str, str], versions_then: Mapping[str, str], code: Iterable[str]) -> list[str]:
+    """Return the differences from these digests and versions, one line each; `code`: specs of users' classes."""
     digests, now = module_digests(code), versions()
     return [
         *(f"module {name} has changed since" for name, then in modules_then.items() if digests.get(name) != then),
@@ -125,7 +124,6 @@ def changes_since(
             for name, then in versions_then.items()
             if now.get(name) != then
         ),
-        *([f"the CPU is {cpu()}; it was {cpu_then}"] if cpu() != cpu_then else []),
     ]
 
 

@@ -37,7 +37,7 @@ def _setup_parts(run: RunData) -> list[Part]:
     repetition: list[Part] = ["Without its `run.json` the run cannot be repeated."]
     if run.started:
         repetition = [
-            "The folder alone is enough to repeat the run; on this CPU and with these versions bit for bit:",
+            "The folder alone is enough to repeat the run; with these versions bit for bit:",
             Listing(f"swarmwire repeat {run.shown_name}"),
         ]
     return [ReportTable(("", ""), tuple(facts), ""), *_problems(run), *_hash(run), *repetition]

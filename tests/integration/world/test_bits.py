@@ -1,0 +1,28 @@
+"""Equal bits: every shipped scenario gives the committed hashes, whatever the machine's libraries and vector units."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+ENVIRONMENTS = {
+    "as it is": {},
+    "generic x86-64 for kernels": {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""},
+    "numpy without vector units": {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR"},
+    "C library without FMA": {
+        "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4,-AVX512F,-AVX2_Usable,-FMA_Usable,-FMA4_Usable"
+    },
+}
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("changes", ENVIRONMENTS.values(), ids=ENVIRONMENTS)
+def test_hashes_of_shipped_scenarios_are_equal_with(changes: dict[str, str]) -> None:
+    if "NUMBA_CPU_NAME" in changes and os.uname().machine != "x86_64":
+        pytest.skip("its target is x86-64")
+    environment = {**os.environ, **changes}
+    child = subprocess.run(
+        [sys.executable, "-m", "tests.tools.bits"], env=environment, capture_output=True, text=True, check=False
+    )
+    assert child.returncode == 0, child.stdout + child.stderr
