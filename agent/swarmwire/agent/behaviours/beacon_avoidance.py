@@ -1,7 +1,7 @@
 """Beacon avoidance: robots without rays avoid one another by the beacons that they receive."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
@@ -196,7 +196,8 @@ def remember(table: NeighbourTable, sightings: Sightings) -> None:
         for name, new in zip(NeighbourTable.columns, new_columns, strict=True)
     }
     newest = _newest(rows, entries["sender"], entries["sequence"])
-    nearest, slot = _nearest(newest, rows, entries["sender"], portable.hypot(entries["x_m"], entries["y_m"]))
+    distance_m = cast(FloatArray, portable.hypot(entries["x_m"], entries["y_m"]))
+    nearest, slot = _nearest(newest, rows, entries["sender"], distance_m)
     forget(table, -np.inf)
     for name in NeighbourTable.columns:
         getattr(table, name)[rows[nearest], slot] = entries[name][nearest]

@@ -13,7 +13,7 @@ from swarmwire.agent.behaviours.pso.core import Bests, Particle, ParticleSwarm
 from swarmwire.agent.fields import Vectors, along, repulsion_of_rays
 from swarmwire.agent.robots import Robots
 from swarmwire.agent.vector_agent import FloatColumn, column
-from swarmwire.comms.base.arrays import BoolArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.robot.messages import Message, f4
 
@@ -72,8 +72,9 @@ class WheeledSwarm(ParticleSwarm[P], Generic[P]):
     def head_for_target(self, robots: Robots, memory: P) -> None:
         """Drive towards the target, and away from near objects."""
         bearing = portable.atan2(memory.target_y, memory.target_x) - robots.compass.heading_rad
-        attraction = np.where(portable.hypot(memory.target_x, memory.target_y) < self.arrived_m, 0.0, 1.0)
-        desired = attraction * along(bearing) + self.avoidance * repulsion_of_rays(robots.proximity)
+        target_m: FloatArray = portable.hypot(memory.target_x, memory.target_y)
+        attraction = np.where(target_m < self.arrived_m, 0.0, 1.0)
+        desired: Vectors = attraction * along(bearing) + self.avoidance * repulsion_of_rays(robots.proximity)
         angle, strength = desired.angle_rad, np.minimum(desired.length, 1.0)
         linear = self.speed_mps * strength * np.maximum(portable.cos(angle), 0.0)
         robots.drive(linear_mps=linear, angular_radps=self.turn_gain_per_s * strength * angle)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol, overload
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.math.exponential import Exponential, define_exponential
 from swarmwire.comms.base.math.huge_angles import TWO_OVER_PI_DIGITS, remainder_of_huge
 from swarmwire.comms.base.math.operations import Operations
@@ -63,26 +63,24 @@ def _define(operations: Operations) -> Functions:
     return Functions(define_trigonometric(operations), define_exponential(operations))
 
 
-FLOATS = _define(
-    Operations(
-        where=lambda condition, x, y: x if condition else y,
-        bits=_bits,
-        from_bits=_from_bits,
-        sqrt=math.sqrt,
-        reduce_huge=_reduce_huge_float,
-        compile=lambda formula: formula,
-    )
-)
-ARRAYS = _define(
-    Operations(
-        where=np.where,
-        bits=lambda x: x.view(np.int64),
-        from_bits=lambda pattern: pattern.view(np.float64),
-        sqrt=np.sqrt,
-        reduce_huge=_reduce_huge_array,
-        compile=lambda formula: formula,
-    )
-)
+def _where(condition: bool, x: Any, y: Any) -> Any:
+    return x if condition else y
+
+
+def _array_bits(x: FloatArray) -> IntArray:
+    return x.view(np.int64)
+
+
+def _array_from_bits(pattern: IntArray) -> FloatArray:
+    return pattern.view(np.float64)
+
+
+def _as_it_is(formula: Callable[..., Any]) -> Callable[..., Any]:
+    return formula
+
+
+FLOATS = _define(Operations(_where, _bits, _from_bits, math.sqrt, _reduce_huge_float, _as_it_is))
+ARRAYS = _define(Operations(np.where, _array_bits, _array_from_bits, np.sqrt, _reduce_huge_array, _as_it_is))
 
 UNARY = ("sin", "cos", "tan", "atan", "asin", "exp", "expm1", "log", "log1p", "log10", "log2", "erfc")
 BINARY = ("atan2", "power", "hypot")
@@ -106,7 +104,9 @@ class Binary(Protocol):
     @overload
     def __call__(self, x: float, y: float, /) -> float: ...
     @overload
-    def __call__(self, x: FloatArray | float, y: FloatArray | float, /) -> FloatArray: ...
+    def __call__(self, x: FloatArray, y: FloatArray | float, /) -> FloatArray: ...
+    @overload
+    def __call__(self, x: float, y: FloatArray, /) -> FloatArray: ...
 
 
 def _function(name: str) -> Any:

@@ -65,9 +65,9 @@ def remainder_of_huge(mantissa: Any, exponent: Any, digits: Any) -> Any:
     b_low = HALF_PI - b_high
     product = high * HALF_PI
     error = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
-    rest = error + (high * HALF_PI_LOW + low * HALF_PI)
-    r = product + rest
-    tail = rest - (r - product)
+    low_part = error + (high * HALF_PI_LOW + low * HALF_PI)
+    r = product + low_part
+    tail = low_part - (r - product)
     if is_negative:
         return -r, -tail, (quotient + 1) & 3
     return r, tail, quotient & 3
