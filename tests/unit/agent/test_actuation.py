@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent import Agent, Memory, Robot, Robots, VectorAgent
+from swarmwire.agent import Robot, Robots
 from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.fields import (
     Vectors,
@@ -54,7 +54,11 @@ def colours(actions: Actions) -> dict[tuple[int, int], str]:
     return {(row, which): f"{rgb:06x}" for row, which, rgb in named}
 
 
-def test_lateral_speed_is_commanded_with_the_others() -> None:
+def test_lateral_speed_is_commanded_with_the_others_and_reset_by_a_later_drive() -> None:
+    def twice(robot: Robot) -> None:
+        robot.drive(0.1, 0.2, 0.3)
+        robot.drive(0.1, 0.2)
+
     for kind in (
         agent_doing(lambda robot: robot.drive(0.1, 0.2, -0.3)),
         vector_agent_doing(lambda robots: robots.drive(0.1, 0.2, -0.3)),
@@ -65,13 +69,6 @@ def test_lateral_speed_is_commanded_with_the_others() -> None:
     rows = np.array([True, False, True])
     masked = acted(vector_agent_doing(lambda robots: robots.drive(0.1, 0.2, np.arange(3.0), rows=rows)), drive=FLOATING)
     assert (masked.drive.tolist(), masked.lateral_mps.tolist()) == (rows.tolist(), [0.0, 0.0, 2.0])
-
-
-def test_lateral_speed_is_reset_by_a_later_drive() -> None:
-    def twice(robot: Robot) -> None:
-        robot.drive(0.1, 0.2, 0.3)
-        robot.drive(0.1, 0.2)
-
     assert not acted(agent_doing(twice), drive=FLOATING).lateral_mps.any()
 
 
@@ -91,16 +88,10 @@ def test_wheel_speeds_become_forward_and_turn() -> None:
 @pytest.mark.parametrize(
     ("kind", "fault"),
     [
-        (agent_doing(lambda robot: robot.wheels(0.1, 0.1)), "the body mine has no wheels: its drive is holonomic"),
-        (
-            vector_agent_doing(lambda robots: robots.wheels(0.1, 0.1)),
-            "the body mine has no wheels: its drive is holonomic",
-        ),
-        (agent_doing(lambda robot: robot.led(1.0, 0.0, 0.0, index=8)), "the body mine has LEDs 0 to 7, got 8"),
-        (
-            vector_agent_doing(lambda robots: robots.led(1.0, 0.0, 0.0, index=-1)),
-            "the body mine has LEDs 0 to 7, got -1",
-        ),
+        (agent_doing(lambda robot: robot.wheels(0.1, 0.1)), "the body mine has no wheels"),
+        (vector_agent_doing(lambda robots: robots.wheels(0.1, 0.1)), "the body mine has no wheels"),
+        (agent_doing(lambda robot: robot.led(1.0, 0.0, 0.0, index=8)), "LEDs 0 to 7, got 8"),
+        (vector_agent_doing(lambda robots: robots.led(1.0, 0.0, 0.0, index=-1)), "LEDs 0 to 7, got -1"),
         (agent_doing(lambda robot: robot.led(255, 0, 0)), "expected numbers from 0 to 1, got 255"),
         (agent_doing(lambda robot: robot.led(0.0, -0.1, 0.0)), "expected numbers from 0 to 1, got -0.1"),
         (vector_agent_doing(lambda robots: robots.led(0.0, 0.0, [0.1, np.nan, 0.2])), "expected numbers from 0 to 1"),
@@ -115,10 +106,9 @@ def test_actuation_that_the_body_lacks_is_refused(kind: type[Any], fault: str) -
 
 def test_leds_of_a_body_without_them_are_refused() -> None:
     bare = replace(group("", ROWS), body=replace(group("", ROWS).body, leds=None))
+    agents = agent_group(bare, agent_doing(lambda robot: robot.led(1.0, 0.0, 0.0)))
     with pytest.raises(AgentFailed, match="IncompatibleBody: the body epuck has no LEDs"):
-        agent_group(bare, agent_doing(lambda robot: robot.led(1.0, 0.0, 0.0))).act(
-            (0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES)
-        )
+        agents.act((0, 0, 100_000_000), readings(0, ROWS), ReceivedPackets.none(MEASURES))
 
 
 def test_leds_take_the_last_colour_all_or_one() -> None:
@@ -132,50 +122,33 @@ def test_leds_take_the_last_colour_all_or_one() -> None:
         assert {led: shown[4, led] for led in range(8)} == {**dict.fromkeys(range(8), "00ff80"), 3: "ff0000"}
 
 
-def test_led_colours_differ_by_robot_within_a_mask() -> None:
+def test_led_colours_differ_by_robot_within_a_mask_and_dark_is_a_colour() -> None:
     def paint(robots: Robots) -> None:
         robots.led(np.array([0.0, 0.5, 1.0]), 0.0, 1.0, index=2, rows=np.array([False, True, True]))
-
-    assert colours(acted(vector_agent_doing(paint))) == {(4, 2): "8000ff", (6, 2): "ff00ff"}
-
-
-def test_led_dark_is_a_colour_and_no_call_changes_nothing() -> None:
-    def one_only(robots: Robots) -> None:
         robots.led(0.0, 0.0, 0.0, index=7, rows=np.array([True, False, False]))
 
-    assert colours(acted(vector_agent_doing(one_only))) == {(1, 7): "000000"}
+    assert colours(acted(vector_agent_doing(paint))) == {(4, 2): "8000ff", (6, 2): "ff00ff", (1, 7): "000000"}
     assert len(acted(vector_agent_doing(lambda robots: robots.drive(0.1, 0.0))).leds) == 0
 
 
-class Blinks(Agent):
-    """A colour that tells its compass, on an LED that tells the tick."""
+def test_leds_are_part_of_equivalence_and_independence() -> None:
+    """A colour by the compass, on an LED by the tick."""
 
-    needs = ("compass",)
+    def blink(handle: Any) -> None:
+        handle.led(0.0, 0.5 + handle.compass.heading_rad / 8.0, 0.0, index=round(10.0 * handle.time_s) % 8)
 
-    def step(self, robot: Robot) -> None:
-        robot.led(0.0, 0.5 + robot.compass.heading_rad / 8.0, 0.0, index=round(10.0 * robot.time_s) % 8)
-
-
-class BlinksToo(VectorAgent):
-    needs = ("compass",)
-
-    def step(self, robots: Robots, memory: Memory) -> None:
-        robots.led(0.0, 0.5 + robots.compass.heading_rad / 8.0, 0.0, index=round(10.0 * robots.time_s) % 8)
-
-
-class BlinksAlike(BlinksToo):
-    def step(self, robots: Robots, memory: Memory) -> None:
+    def blink_alike(robots: Any) -> None:
         heading = np.full(robots.n, robots.compass.heading_rad.mean())
         robots.led(0.0, 0.5 + heading / 8.0, 0.0, index=round(10.0 * robots.time_s) % 8)
 
-
-def test_leds_are_part_of_equivalence_and_independence() -> None:
-    assert_equivalent(Blinks, BlinksToo)
-    assert_rows_independent(BlinksToo, Trial(body="footbot"))
+    single = agent_doing(blink, "compass")
+    many, alike = (vector_agent_doing(deed, "compass") for deed in (blink, blink_alike))
+    assert_equivalent(single, many)
+    assert_rows_independent(many, Trial(body="footbot"))
     with pytest.raises(AssertionError, match=r"in tick 0, robot 0:\n  led 0: 0x"):
-        assert_equivalent(Blinks, BlinksAlike)
+        assert_equivalent(single, alike)
     with pytest.raises(AssertionError, match=r"in tick 0, robot 0:\n  led 0: 0x"):
-        assert_rows_independent(BlinksAlike)
+        assert_rows_independent(alike)
 
 
 def parts(vectors: Vectors) -> list[tuple[float, float]]:
@@ -249,11 +222,8 @@ def test_vectors_are_added_and_weighted() -> None:
 def test_steered_drives_more_slowly_with_a_larger_turn(wanted_rad: float, speed: float, turn: float) -> None:
     linear, angular = steered(3.0 * along(np.array([wanted_rad])), speed_mps=0.2, turn_gain_per_s=1.5)
     assert (linear[0], angular[0]) == pytest.approx((0.2 * speed, 1.5 * turn))
-
-
-def test_steered_drives_straight_for_a_zero_vector() -> None:
-    linear, angular = steered(0.0 * ahead(1), 0.2, 1.5)
-    assert (linear[0], angular[0]) == (0.2, 0.0)
+    straight = steered(0.0 * ahead(1), 0.2, 1.5)
+    assert (straight[0].item(), straight[1].item()) == (0.2, 0.0)
 
 
 @pytest.mark.parametrize("period_s", [0.001, 0.01])
@@ -262,9 +232,6 @@ def test_low_pass_reaches_63_percent_after_its_time_constant(period_s: float) ->
     for _ in range(round(0.5 / period_s)):
         y = low_pass(y, np.ones(1), period_s, 0.5)
     assert y[0] == pytest.approx(1.0 - np.exp(-1.0), abs=period_s)
-
-
-def test_low_pass_without_a_time_constant_passes_everything() -> None:
     assert low_pass(np.array([3.0]), np.array([-1.0]), 0.1, 0.0).tolist() == [-1.0]
 
 

@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent import Agent, Memory, Robot, Robots, VectorAgent
+from swarmwire.agent import Robot, Robots
 from swarmwire.agent.agent import AgentClass
 from swarmwire.agent.executor import AgentExecutor
-from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.messages import encode_dict
@@ -54,24 +53,14 @@ READS = {
 
 @pytest.mark.parametrize("sensor", sorted(READS))
 def test_sensor_without_a_declaration_cannot_be_read(sensor: str) -> None:
-    class Reads(Agent):
-        needs = tuple(READS.keys() - {sensor})
-
-        def step(self, robot: Robot) -> None:
-            READS[sensor](robot)
-
-    class Rows(VectorAgent):
-        needs = Reads.needs
-
-        def step(self, robots: Robots, memory: Memory) -> None:
-            READS[sensor](robots)
-
-    single, vector = failure(Reads), failure(Rows)
+    others = READS.keys() - {sensor}
+    single = failure(agent_doing(READS[sensor], *others))
+    vector = failure(vector_agent_doing(READS[sensor], *others))
     assert single.robots == "flock-2"
     assert vector.robots == "flock-2, flock-5"
     for error in (single, vector):
         assert f"NotDeclared: reads '{sensor}', which its needs do not list" in error.traceback
-        assert re.search(r"test_executor\.py.*in step", error.traceback)
+        assert re.search(r"one_step\.py.*in step", error.traceback)
 
 
 def test_reading_without_a_field_names_its_fields() -> None:
@@ -84,16 +73,13 @@ def test_reading_without_a_field_names_its_fields() -> None:
 def test_declared_sensors_return_the_robots_own_readings() -> None:
     seen: list[tuple[float, ...]] = []
 
-    class Reads(Agent):
-        needs = ("proximity", "compass", "odometry")
+    def read(robot: Robot) -> None:
+        ray = float(robot.proximity.value[3])
+        seen.append((ray, robot.compass.heading_rad, robot.odometry.left_m, robot.odometry.right_m))
+        assert robot.proximity.angle_rad.shape == robot.proximity.distance_m.shape == (8,)
+        assert (robot.time_s, robot.period_s, robot.body.name) == (0.4, 0.1, "epuck")
 
-        def step(self, robot: Robot) -> None:
-            ray = float(robot.proximity.value[3])
-            seen.append((ray, robot.compass.heading_rad, robot.odometry.left_m, robot.odometry.right_m))
-            assert robot.proximity.angle_rad.shape == robot.proximity.distance_m.shape == (8,)
-            assert (robot.time_s, robot.period_s, robot.body.name) == (0.4, 0.1, "epuck")
-
-    once(Reads, [2, 5], tick=4)
+    once(agent_doing(read, *READS), [2, 5], tick=4)
     fields = readings(4, [2, 5]).fields
     columns = (fields["proximity.value"][:, 3], *(fields[n] for n in list(fields)[1:]))
     assert seen == list(zip(*(column.tolist() for column in columns), strict=True))
@@ -112,31 +98,17 @@ def test_radio_measurements_must_be_declared(name: str, need: str) -> None:
 def test_packets_have_sender_sequence_time_range_and_bearing() -> None:
     seen: list[list[tuple[float, ...]]] = []
 
-    class Reads(Agent):
-        needs = ("radio.range", "radio.bearing")
-
-        def step(self, robot: Robot) -> None:
-            packets = robot.radio.received(Word)
-            seen.append([(p.message.number, p.sender, p.sequence, p.received_at_ns, p.range_m) for p in packets])
-            assert all(-1.0 <= p.bearing_rad <= 1.0 for p in packets)
+    def read(robot: Robot) -> None:
+        packets = robot.radio.received(Word)
+        seen.append([(p.message.number, p.sender, p.sequence, p.received_at_ns, p.range_m) for p in packets])
+        assert all(-1.0 <= p.bearing_rad <= 1.0 for p in packets)
 
     received = received_from(words(0, 2, 7), [2, 3, 5])  # robot 3 belongs to another group
-    once(Reads, [2, 5], received)
-    indices = [np.flatnonzero(received.receiver == row) for row in (2, 5)]
-    expected = [
-        [
-            (
-                float(received.sender_index[i]),
-                received.sender_index[i],
-                received.sequence[i],
-                received.received_at_ns[i],
-                received.measured["range_m"][i],
-            )
-            for i in at
-        ]
-        for at in indices
-    ]
-    assert seen == expected
+    once(agent_doing(read, "radio.range", "radio.bearing"), [2, 5], received)
+    sender, range_m = received.sender_index, received.measured["range_m"]
+    columns = sender.astype(float), sender, received.sequence, received.received_at_ns, range_m
+    rows = list(zip(received.receiver.tolist(), *(column.tolist() for column in columns), strict=True))
+    assert seen == [[row[1:] for row in rows if row[0] == receiver] for receiver in (2, 5)]
     assert [len(packets) for packets in seen] == [2, 3]
 
 
@@ -237,13 +209,10 @@ def test_returning_robot_starts_anew_and_others_keep_their_memory(kind: AgentCla
 @pytest.mark.parametrize("kind", ["Counter", "VectorCounter"])
 def test_memory_does_not_depend_on_other_robots_in_the_process(kind: str) -> None:
     together = AgentExecutor(assignment(group(spec(kind), [2, 5])))
-    alone = [AgentExecutor(assignment(group(spec(kind), [row]))) for row in (2, 5)]
+    alone = {row: AgentExecutor(assignment(group(spec(kind), [row]))) for row in (2, 5)}
     for tick, rows in enumerate(([2, 5], [2], [2, 5], [], [5], [2, 5])):
         at_once = together.act(tick, one_group(tick, rows), SILENCE)
-        each = [
-            executor.act(tick, one_group(tick, [row] if row in rows else []), SILENCE)
-            for executor, row in zip(alone, (2, 5), strict=True)
-        ]
+        each = [alone[row].act(tick, one_group(tick, [row] if row in rows else []), SILENCE) for row in (2, 5)]
         assert plain(at_once) == plain(Actions.joined(each))
 
 
@@ -258,29 +227,13 @@ def test_agent_error_names_the_robot_with_its_traceback() -> None:
     agents = agents_for(Failing, [0, 1, 2, 3])
     step(agents, 1, [0, 1, 2, 3])
     with pytest.raises(AgentFailed) as caught:
-        step(agents, 2, [1, 0, 3][1:])
+        step(agents, 2, [0, 3])
     assert caught.value.robots == "flock-0"
     assert "players.py" in caught.value.traceback
-
-
-def test_agent_constructor_error_names_the_robot_with_its_traceback() -> None:
-    with pytest.raises(AgentFailed) as caught:
+    with pytest.raises(AgentFailed) as unmade:
         agents_for(Unmade, [2, 5])
-    assert caught.value.robots == "flock-2, flock-5"
-    assert "no memory left" in caught.value.traceback
-
-
-def test_local_backend_acts_only_between_start_and_close() -> None:
-    backend = LocalBackend(assignment(group(spec("Counter"), [0])))
-    with pytest.raises(RuntimeError, match="not been started"):
-        backend.act(0, one_group(0, [0]), SILENCE)
-    backend.start()
-    assert backend.act(0, one_group(0, [0]), SILENCE).linear_mps.tolist() == [1.0]
-    assert backend.counts() == {}
-    backend.close()
-    backend.close()
-    with pytest.raises(RuntimeError):
-        backend.act(1, one_group(1, [0]), SILENCE)
+    assert unmade.value.robots == "flock-2, flock-5"
+    assert "no memory left" in unmade.value.traceback
 
 
 def test_draws_belong_to_robot_tick_and_purpose() -> None:
@@ -319,9 +272,8 @@ def test_split_group_acts_like_the_undivided_group() -> None:
     for tick in range(5):
         received = received_from(sent, [0, 1, 2, 3])
         expected = step(together, tick, [0, 1, 2, 3], received)
-        assert plain(
-            Actions.joined([step(second, tick, [1, 2], received), step(first, tick, [0, 3], received)])
-        ) == plain(expected)
+        parts = [step(second, tick, [1, 2], received), step(first, tick, [0, 3], received)]
+        assert plain(Actions.joined(parts)) == plain(expected)
         sent = expected.sent
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent import Agent, Memory, Packet, Robot, Robots, TxResult, TxStatus, VectorAgent
+from swarmwire.agent import Agent, Packet, Robot, Robots, TxResult, TxStatus
 from swarmwire.agent.agent_group import _SingleGroup
 from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.local_backend import LocalBackend
@@ -18,40 +18,34 @@ from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_indepe
 from swarmwire.comms.base.errors import AgentFailed, BadFrame
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from tests.support.agent.hosts import SILENCE, agents_for, assignment, group, readings, received_from, spec, step, words
-from tests.support.agent.one_step import agent_doing
+from tests.support.agent.one_step import agent_doing, vector_agent_doing
 from tests.support.agent.players import Insistence, Insisting, Other, VectorInsisting, Word
 
-packets_by_kind = {}
 TRIALS = [Trial(), Trial(robots=1), Trial(robots=30, ticks=20, seed=7)]
 headers = st.builds(
     PacketHeader, st.integers(-1, 2**15 - 1), st.integers(0, 2**32 - 1), st.integers(-(2**63), 2**63 - 1)
 )
 
 
-class Alone(Agent):
-    needs = ("radio.range", "radio.bearing")
+def test_packets_of_one_robot_equal_columns_of_many():
+    lists: list[list[tuple[object, ...]]] = []
 
-    def step(self, robot):
+    def single(robot: Robot) -> None:
         packets: list[Packet[Word]] = robot.radio.received(Word)
         assert all(isinstance(packet, Packet) for packet in packets)
-        packets_by_kind["alone"] = [(packet.sender, packet.range_m, packet.message.number) for packet in packets]
+        lists.append([(packet.sender, packet.range_m, packet.message.number) for packet in packets])
 
-
-class Rows(VectorAgent):
-    needs = ("radio.range", "radio.bearing")
-
-    def step(self, robots, memory):
+    def vector(robots: Robots) -> None:
         packets: Packets[Word] = robots.radio.received(Word)
         assert isinstance(packets.message, Columns)
         columns = (packets.sender, packets.range_m, packets.message.number)
-        packets_by_kind["rows"] = list(zip(*(column.tolist() for column in columns), strict=True))
+        lists.append(list(zip(*(column.tolist() for column in columns), strict=True)))
 
-
-def test_packets_of_one_robot_equal_columns_of_many():
-    for kind in (Alone, Rows):
+    needs = ("radio.range", "radio.bearing")
+    for kind in (agent_doing(single, *needs), vector_agent_doing(vector, *needs)):
         step(agents_for(kind, [5]), 0, [5], received_from(words(0, 2), [5]))
-    assert packets_by_kind["alone"] == packets_by_kind["rows"]
-    assert [sender for sender, _, _ in packets_by_kind["alone"]] == [0, 2]
+    assert lists[0] == lists[1]
+    assert [sender for sender, _, _ in lists[0]] == [0, 2]
 
 
 class Keeps(Agent):
@@ -96,14 +90,11 @@ def test_tx_status_has_the_id_that_send_returned(keeps: type[Keeps]):
 def test_tx_status_of_a_vector_agent_is_in_columns():
     seen: list[TxStatuses] = []
 
-    class Reads(VectorAgent):
-        needs: ClassVar[tuple[str, ...]] = ("radio.tx_status",)
+    def read(robots: Robots) -> None:
+        seen.append(robots.radio.tx_status)
+        robots.radio.send(Other, to=np.arange(robots.n) + 1, number=1.0)
 
-        def step(self, robots: Robots, memory: Memory) -> None:
-            seen.append(robots.radio.tx_status)
-            robots.radio.send(Other, to=np.arange(robots.n) + 1, number=1.0)
-
-    agents = agents_for(Reads, [2, 5, 8])
+    agents = agents_for(vector_agent_doing(read, "radio.tx_status"), [2, 5, 8])
     assert step(agents, 0, [2, 5, 8]).sent.tx_status_ids.tolist() == [0, 0, 0]
     step(agents, 1, [2, 5, 8], tx_statuses=tx_status((5, 0, 2), (8, 0, 0)))
     assert (seen[1].row.tolist(), seen[1].id.tolist(), seen[1].result.tolist()) == ([1, 2], [0, 0], [2, 0])
@@ -127,10 +118,8 @@ def test_tx_status_of_earlier_packets_is_dropped_after_a_restart(keeps: type[Kee
     assert keeps.ids[-6:-3] == [3, 4, 5]
     step(agents, 3, [2, 5], tx_statuses=tx_status((2, 2, 1), (2, 4, 0)))
     assert [[status.id for status in statuses] for statuses in keeps.statuses[5:]] == [[4], []]
-
-
-def test_tx_status_of_a_predecessors_packets_is_dropped(keeps: type[Keeps]):
-    step(agents_for(keeps, [2]), 7, [2], tx_statuses=tx_status((2, 1, 0), (2, 30, 1)))
+    keeps.statuses.clear()
+    step(agents_for(keeps, [2]), 7, [2], tx_statuses=tx_status((2, 1, 0), (2, 30, 1)))  # of its predecessor
     assert keeps.statuses == [[]]
 
 
@@ -164,8 +153,12 @@ def numbers(sent: SentPackets) -> list[tuple[int, float]]:
     return list(zip(sent.sender.tolist(), values, strict=True))
 
 
-def stepped(agent: str, rows: list[int], tick: int = 0, name: str = "flock") -> AgentExecutor:
-    executor = AgentExecutor(assignment(group(spec(agent), rows, name)))
+def stepped(agent: str | type[Agent], rows: list[int], tick: int = 0, name: str = "flock") -> AgentExecutor:
+    """The executor of these agents after their first step."""
+    loaded = spec("Counter") if isinstance(agent, type) else spec(agent)
+    executor = AgentExecutor(assignment(group(loaded, rows, name)))
+    if isinstance(agent, type):
+        executor._agent_groups[name] = _SingleGroup(group("", rows), agent)
     executor.act(tick, {name: readings(tick, rows)}, SILENCE)
     return executor
 
@@ -181,16 +174,13 @@ def test_packet_is_received_between_steps_or_in_the_next_step_never_both(agent: 
     assert numbers(agents.on_receive(1, 30)) == []
 
 
-def test_packets_wait_for_the_step_of_agents_without_on_receive() -> None:
+def test_packets_wait_for_the_first_step_and_for_that_of_agents_without_on_receive() -> None:
     agents = stepped("Counter", [0, 1])
     agents.receive(received_from(words(7), [0]), NO_TX_STATUSES)
     assert len(agents.on_receive(0, 10)) == 0
     assert agents._waiting is not None
     agents.act(1, {"flock": readings(1, [0, 1])}, SILENCE)
     assert not agents._waiting
-
-
-def test_packets_before_the_first_step_are_received_in_it() -> None:
     agents = AgentExecutor(assignment(group(spec("Echo"), [0, 1])))
     agents.receive(received_from(words(7), [0, 1]), NO_TX_STATUSES)
     assert len(agents.on_receive(0, 10)) == 0
@@ -228,9 +218,7 @@ def test_tx_status_arrives_between_steps_with_the_ids_of_that_time() -> None:
             for tx_status in robot.radio.tx_status:
                 id_pairs.append((robot.radio.send(Word(number=2.0), to=9), tx_status.id))
 
-    executor = stepped("Counter", [3])
-    executor._agent_groups["flock"] = _SingleGroup(group("", [3]), Insistent)
-    executor.act(0, {"flock": readings(0, [3])}, SILENCE)
+    executor = stepped(Insistent, [3])
     for id_ in (0, 1):
         executor.receive(SILENCE, TxStatuses(np.array([3]), np.array([id_]), np.array([0])))
         assert len(executor.on_receive(0, 20_000_000)) == 1
@@ -247,9 +235,7 @@ def test_draws_between_steps_are_independent() -> None:
         def on_receive(self, robot: Robot) -> None:
             drawn.append(robot.draw.uniform("x"))
 
-    executor = stepped("Counter", [3])
-    executor._agent_groups["flock"] = _SingleGroup(group("", [3]), Drawing)
-    executor.act(0, {"flock": readings(0, [3])}, SILENCE)
+    executor = stepped(Drawing, [3])
     for at_ns in (10, 20):
         executor.receive(received_from(words(7), [3]), NO_TX_STATUSES)
         executor.on_receive(0, at_ns)
@@ -265,23 +251,31 @@ def test_step_only_calls_fail_between_steps_with_the_robots_name(deed: str) -> N
         def on_receive(self, robot: Robot) -> None:
             exec(deed, {"robot": robot})
 
-    executor = stepped("Counter", [3])
-    executor._agent_groups["flock"] = _SingleGroup(group("", [3]), Doing)
-    executor.act(0, {"flock": readings(0, [3])}, SILENCE)
+    executor = stepped(Doing, [3])
     executor.receive(received_from(words(7), [3]), NO_TX_STATUSES)
     with pytest.raises(AgentFailed, match="flock-3") as caught:
         executor.on_receive(0, 10)
     assert ("ZeroDivisionError" if "/" in deed else "is for step") in caught.value.traceback
 
 
-def test_local_backend_forwards_packets_between_steps_after_its_start() -> None:
+def test_local_backend_acts_and_forwards_packets_between_start_and_close() -> None:
     backend = LocalBackend(assignment(group(spec("Echo"), [0, 1])))
-    with pytest.raises(RuntimeError, match="has not been started"):
-        backend.on_receive(0, 0)
+
+    def assert_closed() -> None:
+        for use in (lambda: backend.on_receive(0, 0), lambda: backend.act(0, sensed, SILENCE)):
+            with pytest.raises(RuntimeError, match="has not been started"):
+                use()
+
+    sensed = {"flock": readings(0, [0, 1])}
+    assert_closed()
     backend.start()
-    backend.act(0, {"flock": readings(0, [0, 1])}, SILENCE)
+    assert len(backend.act(0, sensed, SILENCE).sent) == 2
     backend.receive(received_from(words(1), [0]), NO_TX_STATUSES)
     assert numbers(backend.on_receive(0, 10)) == [(0, 1.0)]
+    assert backend.counts() == {}
+    backend.close()
+    backend.close()
+    assert_closed()
 
 
 def link(*packets: tuple[int, int]) -> LinkStatistics:
@@ -295,24 +289,16 @@ def link(*packets: tuple[int, int]) -> LinkStatistics:
 @given(st.sets(st.integers(0, 60), min_size=1))
 def test_link_statistics_count_skipped_sequences_as_missed(numbers):
     link_statistics = link(*((number, 10 * number + 1) for number in sorted(numbers)))
-    assert (link_statistics.received, link_statistics.missed) == (
-        len(numbers),
-        max(numbers) - min(numbers) + 1 - len(numbers),
-    )
-    assert link_statistics.delivery == len(numbers) / (max(numbers) - min(numbers) + 1)
+    span = max(numbers) - min(numbers) + 1
+    assert (link_statistics.received, link_statistics.missed) == (len(numbers), span - len(numbers))
+    assert link_statistics.delivery == len(numbers) / span
 
 
-def test_link_statistics_fill_the_gap_of_an_overtaken_packet():
-    link_statistics = link((0, 1), (2, 3), (1, 2), (3, 4))
-    assert (link_statistics.received, link_statistics.missed) == (4, 0)
-
-
-def test_link_statistics_restart_with_a_restarted_sender():
-    link_statistics = link((5, 100), (7, 101), (0, 200), (1, 201), (3, 202))
-    assert (link_statistics.received, link_statistics.missed) == (5, 2)
-
-
-def test_link_delivery_is_nan_without_packets():
+def test_link_statistics_fill_gaps_of_overtaken_packets_and_restart_with_the_sender():
+    overtaken = link((0, 1), (2, 3), (1, 2), (3, 4))
+    assert (overtaken.received, overtaken.missed) == (4, 0)
+    restarted = link((5, 100), (7, 101), (0, 200), (1, 201), (3, 202))
+    assert (restarted.received, restarted.missed) == (5, 2)
     assert math.isnan(LinkStatistics().delivery)
 
 
@@ -320,6 +306,7 @@ def test_link_delivery_is_nan_without_packets():
 def test_packet_header_round_trips_with_any_message(header, message):
     assert PacketHeader.decode(header.encode() + message) == header
     assert len(header.encode()) == HEADER_BYTES
+    assert PacketHeader.decode(header._replace(sequence=2**32).encode()).sequence == 0
 
 
 @given(st.binary(max_size=40))
@@ -330,7 +317,3 @@ def test_packet_header_of_any_bytes_decodes_or_is_malformed(data):
         assert error.fault == "malformed"  # noqa: PT017 - most bytes are none
     else:
         assert header.encode() == data[:HEADER_BYTES]
-
-
-def test_packet_sequence_wraps_to_zero():
-    assert PacketHeader.decode(PacketHeader(-1, 2**32, 0).encode()).sequence == 0

@@ -35,7 +35,7 @@ from swarmwire.agent.process_frames import (
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions
-from tests.support.agent.hosts import SILENCE, assignment, group, plain, readings, received_from, spec, words
+from tests.support.agent.hosts import SILENCE, assignment, group, one_group, plain, readings, received_from, spec, words
 from tests.support.agent.processes import Processes, Scripted, ThreadServer, layouts_of, standing
 
 ROWS = range(6)
@@ -118,32 +118,25 @@ def test_memory_continues_in_the_next_process(agent: str) -> None:
     """The numbers of packets go on, and the Memory of a VectorAgent."""
     robots = assignment(group(spec(agent), [*ROWS]))
     first, single = Processes(robots, 6, {}), AgentExecutor(robots)
-    sensed = {"flock": readings(0, [*ROWS])}
-    single.act(0, sensed, SILENCE)
-    first.act(0, sensed, SILENCE, NO_TX_STATUSES)
+    single.act(0, one_group(0, [*ROWS]), SILENCE)
+    first.act(0, one_group(0, [*ROWS]), SILENCE, NO_TX_STATUSES)
     memory = single.memory(["flock"])
     assert first.memory
-    assert {name: column.tolist() for name, column in first.memory["flock"].columns.items()} == {
-        name: column.tolist() for name, column in memory["flock"].columns.items()
+    columns, expected = first.memory["flock"].columns, memory["flock"].columns
+    assert {name: column.tolist() for name, column in columns.items()} == {
+        name: column.tolist() for name, column in expected.items()
     }
     again, as_before = Processes(robots, 3, memory), AgentExecutor(robots, memory)
-    sensed = {"flock": readings(1, [*ROWS])}
-    expected = as_before.act(1, sensed, SILENCE)
-    assert everything(again.act(1, sensed, SILENCE, NO_TX_STATUSES)) == everything(expected)
+    actions = again.act(1, one_group(1, [*ROWS]), SILENCE, NO_TX_STATUSES)
+    assert everything(actions) == everything(as_before.act(1, one_group(1, [*ROWS]), SILENCE))
 
 
 def test_failure_names_the_robot_and_begins_in_the_agents_code() -> None:
     processes = Processes(assignment(group(spec("Failing"), [0])), 1)
-
-    def play() -> None:
-        for tick in range(20):
-            processes.act(tick, {"flock": readings(tick, [0])}, SILENCE, NO_TX_STATUSES)
-
     with pytest.raises(AgentFailed) as caught:
-        play()
+        processes.act(2, one_group(2, [0]), SILENCE, NO_TX_STATUSES)
     assert caught.value.robots == "flock-0"
-    first, *_ = [line for line in caught.value.traceback.splitlines() if "File " in line]
-    assert "players.py" in first
+    assert "players.py" in next(line for line in caught.value.traceback.splitlines() if "File " in line)
 
 
 def test_frame_of_any_size_arrives_complete() -> None:

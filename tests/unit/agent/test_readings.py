@@ -1,14 +1,14 @@
 """Both kinds of agent read the same of every sense, custom sensors too, and set custom actuators alike."""
 
+from collections.abc import Callable
 from dataclasses import astuple, replace
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent import Agent, VectorAgent
 from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed
@@ -23,12 +23,17 @@ from tests.support.agent.hosts import MEASURES, group, readings
 from tests.support.agent.one_step import agent_doing, vector_agent_doing
 
 
-class Moth(Agent):
-    """Drives to the light, away from what it bumped into, and home."""
+def assert_alike(step: Callable[[Any], None], vector_step: Callable[[Any], None], trial: Trial, *needs: str) -> None:
+    """Require that a step of one robot equals a step of n robots, whose rows are independent."""
+    vector_agent = vector_agent_doing(vector_step, *needs)
+    assert_equivalent(agent_doing(step, *needs), vector_agent, trial)
+    assert_rows_independent(vector_agent, trial)
 
-    needs: ClassVar[tuple[str, ...]] = ("light", "bumper", "positioning")
 
-    def step(self, robot) -> None:
+def test_light_bumper_and_position_are_equal_for_one_robot_and_many() -> None:
+    """To the light, away from what it bumped into, and home."""
+
+    def step(robot) -> None:
         x, y = robot.light.vector_sum()
         assert type(x) is type(robot.positioning.x_m) is float
         assert type(robot.bumper.pressed) is bool
@@ -36,26 +41,20 @@ class Moth(Agent):
         back = -0.05 if robot.bumper.pressed else 0.01 * x
         robot.drive(back, 0.1 * y + 0.01 * (robot.positioning.x_m - robot.positioning.y_m))
 
-
-class VectorMoth(VectorAgent):
-    """The same rule for n robots."""
-
-    needs: ClassVar[tuple[str, ...]] = ("light", "bumper", "positioning")
-
-    def step(self, robots, memory) -> None:
+    def vector_step(robots) -> None:
         x, y = robots.light.vector_sum()
         assert robots.light.value.shape == (robots.n, 8)
         assert robots.light.angle_rad.shape == (8,)
         back = np.where(robots.bumper.pressed == 1.0, -0.05, 0.01 * x)
         robots.drive(back, 0.1 * y + 0.01 * (robots.positioning.x_m - robots.positioning.y_m))
 
+    assert_alike(step, vector_step, Trial(body="epuck-gps"), "light", "bumper", "positioning")
 
-class Watcher(Agent):
-    """Drives to the nearest blob, slower on dark ground."""
 
-    needs: ClassVar[tuple[str, ...]] = ("camera", "ground")
+def test_camera_and_ground_are_equal_for_one_robot_and_many() -> None:
+    """To the nearest blob, slower on dark ground."""
 
-    def step(self, robot) -> None:
+    def step(robot) -> None:
         blobs = robot.camera.blobs
         assert robot.ground.shade.shape == (4,)
         if blobs:
@@ -64,77 +63,42 @@ class Watcher(Agent):
             robot.drive(0.1 * blobs[0].distance_m * robot.ground.shade[0], blobs[0].bearing_rad + 1e-9 * len(blobs))
             robot.led(*((blobs[-1].colour >> shift & 255) / 255 for shift in (16, 8, 0)))
 
-
-class VectorWatcher(VectorAgent):
-    """The same rule for n robots."""
-
-    needs: ClassVar[tuple[str, ...]] = ("camera", "ground")
-
-    def step(self, robots, memory) -> None:
+    def vector_step(robots) -> None:
         camera, count = robots.camera, robots.camera.count
         last = np.where(count > 0, camera.colour[np.arange(robots.n), count - 1], 0.0).astype(np.int64)
         speed = 0.1 * camera.distance_m[:, 0] * robots.ground.shade[:, 0]
         robots.drive(speed, camera.bearing_rad[:, 0] + 1e-9 * count, rows=count > 0)
         robots.led(*((last >> shift & 255) / 255 for shift in (16, 8, 0)), rows=count > 0)
 
-
-def test_camera_and_ground_are_equal_for_one_robot_and_many() -> None:
-    assert_equivalent(Watcher, VectorWatcher, Trial(body="footbot"))
-    assert_rows_independent(VectorWatcher, Trial(body="footbot"))
+    assert_alike(step, vector_step, Trial(body="footbot"), "camera", "ground")
 
 
-class Follower(Agent):
-    """Turns from walls, which are what proximity sees and passive infrared does not."""
+def test_infrared_is_equal_for_one_robot_and_many() -> None:
+    """Away from walls, which are what proximity sees and passive infrared does not."""
 
-    needs: ClassVar[tuple[str, ...]] = ("proximity", "infrared")
-
-    def step(self, robot) -> None:
+    def step(robot) -> None:
         wall = robot.proximity.value * (robot.infrared.value == 0.0)
         assert wall.shape == robot.infrared.angle_rad.shape == (12,)
         robot.drive(robot.infrared.distance_m[1], float(wall.max()))
 
-
-class VectorFollower(VectorAgent):
-    """The same rule for n robots."""
-
-    needs: ClassVar[tuple[str, ...]] = ("proximity", "infrared")
-
-    def step(self, robots, memory) -> None:
+    def vector_step(robots) -> None:
         wall = robots.proximity.value * (robots.infrared.value == 0.0)
         robots.drive(robots.infrared.distance_m[:, 1], wall.max(axis=1))
 
-
-def test_infrared_is_equal_for_one_robot_and_many() -> None:
-    assert_equivalent(Follower, VectorFollower, Trial(body="flockbot"))
-
-
-class Roamer(Agent):
-    """Turns away from the nearest return of the laser."""
-
-    needs: ClassVar[tuple[str, ...]] = ("scan",)
-
-    def step(self, robot) -> None:
-        nearest = int(robot.scan.range_m.argmin())
-        robot.drive(0.1, -float(robot.scan.angle_rad[nearest]))
-
-
-class VectorRoamer(VectorAgent):
-    """The same rule for n robots."""
-
-    needs: ClassVar[tuple[str, ...]] = ("scan",)
-
-    def step(self, robots, memory) -> None:
-        assert robots.scan.range_m.shape == (robots.n, 360)
-        robots.drive(0.1, -robots.scan.angle_rad[robots.scan.range_m.argmin(axis=1)])
+    assert_alike(step, vector_step, Trial(body="flockbot"), "proximity", "infrared")
 
 
 def test_scan_is_equal_for_one_robot_and_many() -> None:
-    assert_equivalent(Roamer, VectorRoamer, Trial(body="turtlebot3-burger"))
+    """Away from the nearest return of the laser."""
 
+    def step(robot) -> None:
+        robot.drive(0.1, -float(robot.scan.angle_rad[int(robot.scan.range_m.argmin())]))
 
-def test_readings_are_equal_for_one_robot_and_many() -> None:
-    assert_equivalent(Moth, VectorMoth, Trial(body="epuck-gps"))
-    assert_rows_independent(VectorMoth, Trial(body="epuck-gps"))
+    def vector_step(robots) -> None:
+        assert robots.scan.range_m.shape == (robots.n, 360)
+        robots.drive(0.1, -robots.scan.angle_rad[robots.scan.range_m.argmin(axis=1)])
+
+    assert_alike(step, vector_step, Trial(body="turtlebot3-burger"), "scan")
 
 
 EPUCK = load_body("epuck")
@@ -151,12 +115,8 @@ BODY = replace(
 TRIAL = Trial(body=BODY)
 
 
-class Sniffer(Agent):
-    """Uses all of it."""
-
-    needs: ClassVar[tuple[str, ...]] = ("gas", "imu", "battery")
-
-    def step(self, robot) -> None:
+def test_custom_parts_imu_and_battery_are_equal_for_one_robot_and_many() -> None:
+    def step(robot) -> None:
         gas, imu = robot.sensor("gas"), robot.imu
         assert type(gas.level) is type(imu.turn_radps) is type(robot.battery.charge) is float
         assert gas.cells.shape == (3,)
@@ -165,13 +125,7 @@ class Sniffer(Agent):
             robot.actuate("horn", gas.level)
         robot.actuate("arm", gas.cells * robot.battery.charge)
 
-
-class VectorSniffer(VectorAgent):
-    """The same rule for n robots."""
-
-    needs: ClassVar[tuple[str, ...]] = ("gas", "imu", "battery")
-
-    def step(self, robots, memory) -> None:
+    def vector_step(robots) -> None:
         gas, imu = robots.sensor("gas"), robots.imu
         assert gas.cells.shape == (robots.n, 3)
         turn = imu.forward_mps2 + imu.left_mps2 + imu.turn_radps
@@ -179,10 +133,7 @@ class VectorSniffer(VectorAgent):
         robots.actuate("horn", gas.level, rows=gas.level > 0.5)
         robots.actuate("arm", gas.cells * robots.battery.charge[:, None])
 
-
-def test_actions_are_equal_for_one_robot_and_many() -> None:
-    assert_equivalent(Sniffer, VectorSniffer, TRIAL)
-    assert_rows_independent(VectorSniffer, TRIAL)
+    assert_alike(step, vector_step, TRIAL, "gas", "imu", "battery")
 
 
 @pytest.mark.parametrize(
@@ -190,25 +141,22 @@ def test_actions_are_equal_for_one_robot_and_many() -> None:
     [
         (lambda robots: robots.sensor("gas").colour, "the sensor gas has the fields level, cells, not colour"),
         (lambda robots: robots.sensor("compass"), "NotDeclared"),
-        (
-            lambda robots: robots.actuate("leg", 1.0),
-            "IncompatibleBody.* no custom actuator 'leg': it has horn, arm",
-        ),
+        (lambda robots: robots.actuate("leg", 1.0), "IncompatibleBody.* no custom actuator 'leg': it has horn, arm"),
         (lambda robots: robots.actuate("arm", [1.0, 2.0]), "expected 3 numbers, got the shape"),
         (lambda robots: robots.actuate("horn", np.zeros((2, 2))), "expected 1 numbers, got the shape"),
         (lambda robots: robots.actuate("horn", np.nan), "expected finite numbers, got nan"),
         *(
             (lambda robots, values=values: robots.actuate("arm", values, rows=np.arange(robots.n) > 0), message)
             for values, message in (
-                ([1.0, 2.0], r"ValueError: .*expected 3 numbers, got the shape \(2,\)"),
-                (np.zeros((2, 3)), r"ValueError: .*expected 3 numbers, got the shape \(2, 3\)"),
-                (np.zeros((2, 2, 3)), r"ValueError: .*expected 3 numbers, got the shape \(2, 2, 3\)"),
-                ([1.0, 2.0, np.inf], "ValueError: .*expected finite numbers"),
+                ([1.0, 2.0], r"expected 3 numbers, got the shape \(2,\)"),
+                (np.zeros((2, 3)), r"expected 3 numbers, got the shape \(2, 3\)"),
+                (np.zeros((2, 2, 3)), r"expected 3 numbers, got the shape \(2, 2, 3\)"),
+                ([1.0, 2.0, np.inf], "expected finite numbers"),
             )
         ),
         (
             lambda robots: robots.actuate("horn", np.zeros(robots.n + 1), rows=np.arange(robots.n) > 0),
-            "ValueError: .*expected 1 numbers, got the shape",
+            "expected 1 numb",
         ),
     ],
 )

@@ -78,6 +78,10 @@ class _Set:
     def written(self) -> dict[str, object]:
         return json.loads(self.file.read_text())
 
+    @property
+    def summary(self) -> dict[str, object]:
+        return json.loads((self.log.folder / "summary.json").read_text())
+
 
 def test_log_and_status_are_written_once_a_second(tmp_path):
     looking = _Set(tmp_path)
@@ -134,14 +138,8 @@ def test_end_is_in_the_last_status_and_the_summary(tmp_path):
     looking.steps(3)
     looking.onlookers.end("SIGTERM")
     assert (looking.written["state"], looking.written["ended"]) == ("ended", "SIGTERM")
-    summary = json.loads((looking.log.folder / "summary.json").read_text())
-    assert summary == {
-        "ended": "SIGTERM",
-        "ticks": 3,
-        "late_ticks": 0,
-        "watchdog_stops": 0,
-        "counts": {"clipped_commands": 3},
-    }
+    expected = {"ended": "SIGTERM", "ticks": 3, "late_ticks": 0, "watchdog_stops": 0, "counts": {"clipped_commands": 3}}
+    assert looking.summary == expected
 
 
 def test_emergency_stop_is_reported_at_once_in_status_and_summary(tmp_path, capsys):
@@ -149,31 +147,26 @@ def test_emergency_stop_is_reported_at_once_in_status_and_summary(tmp_path, caps
     looking.steps(12)
     looking.control.estop()
     looking.control.estop()
-    error_output = until(lambda: capsys.readouterr().err)
-    assert error_output == (
-        "robot-0: emergency stop at step 12: motors stay off; stop the agent and start it again to continue\n"
-    )
+    error = until(lambda: capsys.readouterr().err)
+    assert error.startswith("robot-0: emergency stop at step 12: ")
+    assert error.count("\n") == 1
     looking.steps(10)
     assert (looking.written["state"], looking.written["emergency_stop_at"]) == ("estop", 12)
     looking.onlookers.end("SIGINT")
-    summary_line = (
-        "robot-0: ended (SIGINT), stopped by an emergency stop at step 12, after 22 steps; clipped_commands 3"
-    )
-    assert capsys.readouterr().out.splitlines() == [summary_line]
-    assert json.loads((looking.log.folder / "summary.json").read_text())["emergency_stop_at"] == 12
+    assert "stopped by an emergency stop at step 12, after 22 steps" in capsys.readouterr().out
+    assert looking.summary["emergency_stop_at"] == 12
 
 
 def test_watchdog_stop_is_reported_at_once(tmp_path, capsys):
     looking = _Set(tmp_path)
     looking.onlookers.report_silence(0.512)
-    message = "watchdog: no heartbeat of the agent for 0.51 s; motors off until the next one"
-    assert until(lambda: capsys.readouterr().err) == f"robot-0: {message}\n"
+    assert until(lambda: capsys.readouterr().err).startswith("robot-0: watchdog: no heartbeat of the agent for 0.51 s")
     looking.onlookers.end("duration")
 
 
 def test_failure_is_reported_with_its_cause_and_not_as_no_faults(tmp_path, capsys):
     looking = _Set(tmp_path)
-    looking.status = {**looking.status, "counts": {}}
+    looking.status["counts"] = {}
     looking.onlookers.end("no driver", "nobody answers")
     assert capsys.readouterr().out == "robot-0: ended (no driver: nobody answers) after 0 steps\n"
 
@@ -187,23 +180,19 @@ def test_log_write_error_is_reported_once_without_stopping_the_robot(tmp_path, c
     monkeypatch.setattr(looking.log._ticks, "_append", full)
     looking.steps(30)
     looking.onlookers.end("duration")
-    assert capsys.readouterr().err.splitlines() == [
-        "robot-0: the log cannot be written; the agent runs on without lost rows: [Errno 28] No space left on device"
-    ]
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("robot-0: the log cannot be written")
     assert looking.written["counts"] == {"clipped_commands": 3, "log_rows_lost": 30}
 
 
 def test_clock_change_is_reported_and_counted_unlike_synchronisation(tmp_path, capsys):
     looking = _Set(tmp_path)
-    looking.steps(10)
-    looking.clock.set_by_ns = to_ns(0.01)
-    looking.steps(10)
-    looking.clock.set_by_ns = to_ns(-3.24)
-    looking.steps(20)
+    for set_by_s in (0.0, 0.01, -3.24, -3.24):
+        looking.clock.set_by_ns = to_ns(set_by_s)
+        looking.steps(10)
     looking.onlookers.end("duration")
-    assert capsys.readouterr().err.splitlines() == [
-        "robot-0: the clock was set by -3.250 s: times in the log before and after do not compare"
-    ]
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("robot-0: the clock was set by -3.250 s")
     assert looking.written["counts"] == {"clipped_commands": 3, "clock_set": 1}
 
 
@@ -239,18 +228,17 @@ def test_terminal_loss_does_not_stop_the_robot(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("change", "line"),
+    ("change", "end"),
     [
-        ({}, "running, tick 600"),
-        ({"agent_state": "search"}, "running, tick 600, search"),
-        ({"late_ticks": 2}, "running, tick 600, 2 late"),
-        ({"charge": 0.5}, "running, tick 600, battery 50 %"),
+        ({}, ""),
+        ({"agent_state": "search"}, ", search"),
+        ({"late_ticks": 2}, ", 2 late"),
+        ({"charge": 0.5}, ", battery 50 %"),
     ],
 )
-def test_status_line_has_the_known_values(change, line):
-    assert (
-        short({"state": "running", "tick": 600, "agent_state": "", "late_ticks": 0, "charge": None, **change}) == line
-    )
+def test_status_line_has_the_known_values(change, end):
+    status = {"state": "running", "tick": 600, "agent_state": "", "late_ticks": 0, "charge": None, **change}
+    assert short(status) == f"running, tick 600{end}"
 
 
 class _Swarm:
@@ -278,16 +266,13 @@ def test_missing_robots_are_reported_after_five_seconds_and_on_arrival():
     swarm.pose = ORIGIN
     assert swarm.seconds(4) == []
     assert swarm.seconds(10) == ["radio: no packets from any of k-1, k-2"]
-    swarm.received.add("k-2")
-    assert swarm.seconds(3) == ["radio: first packets from k-2"]
-    swarm.received.add("k-1")
-    assert swarm.seconds(3) == ["radio: first packets from k-1"]
-
-
-def test_received_robots_are_not_reported_missing():
-    swarm = _Swarm()
-    swarm.pose, swarm.received = ORIGIN, {"k-1"}
-    assert swarm.seconds(9) == ["radio: no packets from k-2"]
+    for robot in ("k-2", "k-1"):
+        swarm.received.add(robot)
+        assert swarm.seconds(3) == [f"radio: first packets from {robot}"]
+    partly = _Swarm()
+    partly.pose, partly.received = ORIGIN, {"k-1"}
+    assert partly.seconds(9) == ["radio: no packets from k-2"]
+    assert _Swarm(pace=10.0).seconds(49) == []  # the timeout is wall time
 
 
 def test_missing_poses_are_reported_and_counted_and_their_return():
@@ -301,10 +286,6 @@ def test_missing_poses_are_reported_and_counted_and_their_return():
     assert swarm.seconds(4) == []
     assert swarm.seconds(1) == ["tracker: no pose of this robot for 5 s"]
     assert swarm.presence.counts() == {"seconds_without_pose": 14}
-
-
-def test_liveness_timeout_is_wall_time_at_any_pace():
-    assert _Swarm(pace=10.0).seconds(49) == []
 
 
 @pytest.fixture
@@ -333,9 +314,8 @@ def test_help_has_an_example(capsys):
             cli.main(arguments)
         assert ended.value.code == 0
     output = capsys.readouterr().out
-    assert "swarmwire-agent run avoid.py:Avoid --driver epuck2" in output
-    assert "exit codes: 0 it ended, 1 it failed, 2 bad input, 130 Ctrl-C" in output
-    assert "--duration-s S" in output
+    for text in ("swarmwire-agent run avoid.py:Avoid --driver epuck2", "exit codes: 0 it ended", "--duration-s S"):
+        assert text in output
 
 
 def test_help_of_stop_motors_lists_only_its_options(capsys):
@@ -399,11 +379,13 @@ def test_agent_that_is_unusable_is_refused(installed, capsys, agent, message):
 
 @pytest.mark.parametrize(
     ("flags", "remedy"),
-    [((), "expected --radio zenoh with --tracker, or --radio world; "), (("--radio", "zenoh"), "expected --tracker")],
+    [
+        ((), "expected --radio zenoh with --tracker, or --radio world; "),
+        (("--radio", "zenoh", "--listen", "tcp/127.0.0.1:0"), "expected --tracker"),
+    ],
 )
 def test_unmet_needs_name_the_flags_that_meet_them(installed, capsys, flags, remedy):
-    listen = ("--listen", "tcp/127.0.0.1:0") if flags else ()
-    assert cli.main(["check", f"{PLAYERS}:Ranging", *robot_flags(installed, *flags, *listen)]) == 2
+    assert cli.main(["check", f"{PLAYERS}:Ranging", *robot_flags(installed, *flags)]) == 2
     assert remedy in capsys.readouterr().err
 
 
@@ -429,9 +411,7 @@ def test_drivers_of_the_same_name_are_refused(installed, tmp_path, monkeypatch, 
     (other / "entry_points.txt").write_text("[swarmwire.drivers]\nwritten = elsewhere:Written\n")
     monkeypatch.syspath_prepend(other.parent)
     assert cli.main(["check", DRIVING, *robot_flags(installed)]) == 2
-    output = capsys.readouterr().err
-    assert "expected one driver of the name 'written'" in output
-    assert "another" in output
+    assert re.search("expected one driver of the name 'written'.*another", capsys.readouterr().err)
 
 
 def test_stop_motors_reads_the_settings_of_the_run(installed, tmp_path, capsys):

@@ -19,7 +19,7 @@ from swarmwire.agent.on_robot.safety import SIGNALS, Heartbeats, Motors, StopFla
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import load_body
-from tests.support.agent.on_robot.scripted import DatedFakeClock, Rig, ScriptedDriver
+from tests.support.agent.on_robot.scripted import DatedFakeClock, Rig, ScriptedDriver, lost
 from tests.support.clocks import MS, FakeClock
 from tests.support.refusals import refused_input
 
@@ -31,42 +31,28 @@ def _watchdog(clock: FakeClock) -> tuple[Watchdog, list[str]]:
     return Watchdog(0.5, lambda: stops.append("stop"), clock), stops
 
 
-def test_watchdog_stops_the_motors_once_per_lapse():
+def test_watchdog_stops_the_motors_once_at_its_timeout():
     clock = FakeClock()
     watchdog, stops = _watchdog(clock)
     watchdog.feed()
-    clock.time_ns += 499 * MS
-    watchdog.check()
-    assert stops == []
-    clock.time_ns += MS
-    watchdog.check()
-    clock.time_ns += 5000 * MS
-    watchdog.check()
-    assert stops == ["stop"]
+    for later_ms, expected in ((499, []), (1, ["stop"]), (5000, ["stop"])):
+        clock.time_ns += later_ms * MS
+        watchdog.check()
+        assert stops == expected
     assert watchdog.stops == 1
 
 
-def test_watchdog_reports_each_lapse_once_with_its_duration():
-    clock, reported = FakeClock(), list[float]()
-    watchdog = Watchdog(0.5, lambda: None, clock, report=reported.append)
+def test_watchdog_stops_and_reports_each_lapse_once_with_its_duration():
+    clock, stops, reported = FakeClock(), list[str](), list[float]()
+    watchdog = Watchdog(0.5, lambda: stops.append("stop"), clock, report=reported.append)
     for silent_ms in (600, 750):
         watchdog.feed()
         clock.time_ns += silent_ms * MS
         watchdog.check()
         clock.time_ns += 100 * MS
         watchdog.check()
+    assert stops == ["stop"] * 2
     assert reported == [0.6, 0.75]
-
-
-def test_watchdog_restarts_after_a_lapse():
-    clock = FakeClock()
-    watchdog, stops = _watchdog(clock)
-    for _ in range(3):
-        watchdog.feed()
-        clock.time_ns += 600 * MS
-        watchdog.check()
-        watchdog.check()
-    assert stops == ["stop"] * 3
 
 
 def test_watchdog_is_idle_before_the_first_feed_and_while_suspended():
@@ -102,58 +88,14 @@ def test_watchdog_thread_checks_and_sends_heartbeats():
     watchdog.end()
 
 
-class Robot:
-    """Keeps what it is told; may be out of reach, or be told to stop while a command is on its way."""
-
-    def __init__(self) -> None:
-        self.calls: list[str] = []
-        self.reachable, self.on_act = True, lambda: None
-
-    def act(self, command: Command) -> None:
-        self.calls.append("act")
-        self.on_act()
-
-    def emergency_stop(self) -> None:
-        self.stop()
-
-    def stop(self) -> None:
-        if not self.reachable:
-            raise DriverLost("nobody answers")
-        self.calls.append("stop")
-
-
-def test_emergency_stop_blocks_later_commands() -> None:
-    robot = Robot()
-    motors = Motors(robot)
-    motors.act(None)
-    motors.control.estop()
-    motors.act(None)
-    assert robot.calls == ["act", "stop"]
-
-
-def test_emergency_stop_during_a_command_stops_again_after_it() -> None:
-    robot = Robot()
-    motors = Motors(robot)
-    robot.on_act = motors.control.estop
-    motors.act(None)
-    assert robot.calls == ["act", "stop", "stop"]
-
-
 def test_emergency_stop_out_of_reach_raises_but_latches() -> None:
-    robot = Robot()
-    motors = Motors(robot)
-    robot.reachable = False
+    driver = ScriptedDriver(DatedFakeClock())
+    driver.faults = {"stop": [lost, lost]}
+    motors = Motors(driver)
     motors.stop()
     with pytest.raises(DriverLost):
         motors.control.estop()
     assert motors.control.stopped
-
-
-def test_emergency_stop_of_an_unreachable_robot_raises_despite_its_answer() -> None:
-    motors = Motors(Robot())
-    motors.reachable = False
-    with pytest.raises(DriverLost):
-        motors.control.estop()
 
 
 @pytest.mark.parametrize("number", SIGNALS)
@@ -204,12 +146,13 @@ def test_heartbeats_carry_the_latched_stop(ends):
     assert os.read(beats, 9) == RUNS + STOPPED
 
 
-def test_heartbeats_do_not_block_with_a_frozen_guard(ends):
+def test_heartbeats_do_not_block_with_a_frozen_guard_or_none(ends):
     _, pipe = ends
     with suppress(BlockingIOError):
         while os.write(pipe, b"." * 4096):
             continue
-    Heartbeats(pipe, lambda: False, _alone)()
+    for end in (pipe, None):
+        Heartbeats(end, lambda: False, _alone)()
 
 
 def test_heartbeats_notice_a_dead_guard(ends):
@@ -220,16 +163,12 @@ def test_heartbeats_notice_a_dead_guard(ends):
     assert alone == [True]
 
 
-def test_heartbeats_do_nothing_without_a_guard():
-    Heartbeats(None, lambda: False, _alone)()
-
-
-def _epuck2(address: str) -> Epuck2Driver:
-    return Epuck2Driver(address, load_body("epuck2"), Epuck2Options(), DatedFakeClock())
-
-
 def test_target_is_the_same_with_and_without_the_default_port():
-    assert _epuck2("10.0.0.1").target == _epuck2("10.0.0.1:1000").target != _epuck2("10.0.0.1:1001").target
+    short, full, other = (
+        Epuck2Driver(f"10.0.0.1{port}", load_body("epuck2"), Epuck2Options(), DatedFakeClock()).target
+        for port in ("", ":1000", ":1001")
+    )
+    assert short == full != other
 
 
 def robot_lock() -> RobotLock:
@@ -237,9 +176,15 @@ def robot_lock() -> RobotLock:
     return RobotLock("scripted", ScriptedDriver(clock), clock)
 
 
-def test_lock_is_exclusive_and_released(tmp_path, monkeypatch):
+@pytest.fixture
+def locks(tmp_path, monkeypatch) -> tuple[RobotLock, RobotLock]:
+    """Two locks of one robot, whose files are in the test's folder."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    first, second = robot_lock(), robot_lock()
+    return robot_lock(), robot_lock()
+
+
+def test_lock_is_exclusive_and_released(locks):
+    first, second = locks
     assert second.request_stop() is None
     with first.acquire("robot.toml"):
         first.write_result(STOPPED_MESSAGE)
@@ -249,14 +194,6 @@ def test_lock_is_exclusive_and_released(tmp_path, monkeypatch):
         pass
 
 
-def test_lock_of_a_dead_agent_is_ignored(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    first, second = robot_lock(), robot_lock()
-    with first.acquire("robot.toml"):
-        next((tmp_path / "swarmwire").iterdir()).write_text("99999999\n")  # no process has this number
-        assert second.request_stop() is None
-
-
 @pytest.mark.parametrize(
     ("result", "expected"),
     [
@@ -264,9 +201,8 @@ def test_lock_of_a_dead_agent_is_ignored(tmp_path, monkeypatch):
         ("", "drives the robot at nowhere, and did not confirm the stop within 2 s"),
     ],
 )
-def test_lock_holder_without_confirmation_is_reported(tmp_path, monkeypatch, result, expected):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    signals, first, second = [], robot_lock(), robot_lock()
+def test_lock_holder_without_confirmation_is_reported(locks, result, expected):
+    signals, (first, second) = [], locks
     before = signal.signal(STOP_SIGNAL, lambda *_: signals.append(True))
     try:
         with first.acquire("robot.toml"):
@@ -278,10 +214,9 @@ def test_lock_holder_without_confirmation_is_reported(tmp_path, monkeypatch, res
     assert signals == [True]  # once, not in every round
 
 
-@pytest.mark.parametrize("words", ["", "somebody\n", "\xff\xfe"])
-def test_lock_without_a_process_id_does_not_block_a_stop(tmp_path, monkeypatch, words):
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    first, second = robot_lock(), robot_lock()
+@pytest.mark.parametrize("words", ["", "somebody\n", "\xff\xfe", "99999999\n"])  # no process has this number
+def test_lock_without_a_living_process_does_not_block_a_stop(tmp_path, locks, words):
+    first, second = locks
     with first.acquire("robot.toml"):
         next((tmp_path / "swarmwire").iterdir()).write_bytes(words.encode("latin-1"))
         assert second.request_stop() is None

@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -27,7 +28,6 @@ from swarmwire.agent.on_robot.plan import (
 from swarmwire.agent.on_robot.settings import NO_FILE, read_settings
 from swarmwire.agent.policy_io import PolicyIO
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.wire.network import Network
@@ -103,7 +103,6 @@ MISSING = {
 SWARM = {"robots": ["flock-0", "flock-1", "flock-2"], "name": "flock-1"}
 ROOT = Path(__file__).parents[4]
 BODY = load_body("epuck2")  # it has a compass, and no positioning
-EPUCK2 = load_body("epuck2")
 SPEEDS = st.floats(-1e3, 1e3)
 LIMITS = SpeedLimits(0.1, 2.0, wheel_mps=0.12, wheel_base_m=0.053)
 
@@ -139,20 +138,16 @@ def test_settings_need_only_agent_and_driver(tmp_path):
     assert (settings.max_linear_mps, settings.log, settings.body) == (None, "", "")
 
 
-def test_module_and_body_names_are_no_paths(tmp_path):
-    settings = read_settings(
-        _file(tmp_path, LEAST), {"agent": ("AGENT", "package.module:Mine"), "body": ("--body", "epuck")}
-    )
-    assert (settings.agent, settings.body) == ("package.module:Mine", "epuck")
-
-
 def test_flags_override_the_file_and_replace_it(tmp_path):
     flags: dict[str, tuple[str, Any]] = {
+        "agent": ("AGENT", "package.module:Mine"),  # names of modules and bodies are no paths
+        "body": ("--body", "epuck"),
         "rate_hz": ("--rate-hz", 5),
         "driver.address": ("--address", "10.0.0.2"),
         "params.gain": ("--param gain", 2),
     }
     settings = read_settings(_file(tmp_path, ALL_SETTINGS), flags)
+    assert (settings.agent, settings.body) == ("package.module:Mine", "epuck")
     assert (settings.rate_hz, settings.driver.address, settings.driver.name) == (5, "10.0.0.2", "epuck2")
     assert settings.params == {"gain": 2}
     alone = read_settings(None, {"agent": ("AGENT", "a.b:C"), "driver.name": ("--driver", "epuck2")})
@@ -169,10 +164,9 @@ def test_wrong_or_missing_settings_are_refused_with_file_and_key(tmp_path, text,
 
 
 def test_missing_file_is_named_or_else_the_command_line():
-    with pytest.raises(BadInput, match=r"nowhere\.toml: expected a readable file"):
-        read_settings(Path("nowhere.toml"), {})
-    with refused_input(NO_FILE):
-        read_settings(None, {})
+    for file, where in ((Path("nowhere.toml"), "nowhere.toml"), (None, NO_FILE)):
+        with refused_input(where):
+            read_settings(file, {})
 
 
 @pytest.fixture(scope="module")
@@ -187,25 +181,22 @@ def folders(tmp_path_factory) -> tuple[Path, Path]:
     return authorities[0], authorities[1]
 
 
-def _check(ca: Path, certificate: Path, key: Path) -> None:
-    check_certificates(Network(listen=("tls/127.0.0.1:0",), ca=ca, certificate=certificate, key=key), "robot.toml")
+def test_certificates_that_do_not_match_are_refused(folders):
+    def check(ca: Path, certificate: Path, key: Path) -> None:
+        network = Network(listen=("tls/127.0.0.1:0",), ca=ca, certificate=certificate, key=key)
+        check_certificates(network, "robot.toml")
 
-
-def test_certificates_that_match_are_accepted(folders):
-    lab, _ = folders
-    _check(lab / "ca.pem", lab / "flock-0.pem", lab / "flock-0.key")
-
-
-def test_certificate_that_does_not_match_is_refused_in_one_line(folders):
     lab, other = folders
+    ca, certificate, key = lab / "ca.pem", lab / "flock-0.pem", lab / "flock-0.key"
+    check(ca, certificate, key)
     cases = {
-        "network.key": (lab / "ca.pem", lab / "flock-0.pem", lab / "flock-1.key"),
-        "network.certificate": (other / "ca.pem", lab / "flock-0.pem", lab / "flock-0.key"),
-        "network.ca": (lab / "flock-0.key", lab / "flock-0.pem", lab / "flock-0.key"),
+        "network.key": (ca, certificate, lab / "flock-1.key"),
+        "network.certificate": (other / "ca.pem", certificate, key),
+        "network.ca": (key, certificate, key),
     }
-    for key, files in cases.items():
-        with refused_input("robot.toml", key):
-            _check(*files)
+    for name, files in cases.items():
+        with refused_input("robot.toml", name):
+            check(*files)
 
 
 def _plan(agent: str = "Driving", folder: Path | None = None, **more: Any) -> RobotConfig:
@@ -230,52 +221,39 @@ def test_parameter_list_gives_each_robot_its_value():
 
 
 @pytest.mark.parametrize(
-    ("params", "message"),
-    [
-        ({"lane": [3, 4]}, "lane: expected a whole number, or a list with one for each of the 3 robots"),
-        ({"lane": 0.5}, "lane: expected a whole number"),
-        ({"lanes": 1}, "lanes: unknown parameter of Laned; expected one of lane (did you mean this?)"),
-    ],
+    ("params", "key"), [({"lane": [3, 4]}, "lane"), ({"lane": 0.5}, "lane"), ({"lanes": 1}, "lanes")]
 )
-def test_wrong_parameters_are_refused(params, message):
-    with pytest.raises(BadInput) as refused:
+def test_wrong_parameters_are_refused(params, key):
+    with refused_input("robot.toml", f"params.{key}"):
         _plan("Laned", params=params, **SWARM)
-    assert str(refused.value).startswith(f"robot.toml: params.{message}")
 
 
 def test_body_defaults_to_that_of_the_driver(tmp_path):
     assert _plan().body.name == "epuck2"
-    (tmp_path / "mine.toml").write_text('like = "epuck2"\nmass_kg = 0.2\n')
+    sheet = tmp_path / "mine.toml"
+    sheet.write_text('like = "epuck2"\nmass_kg = 0.2\n')
     plan = _plan(folder=tmp_path, body="mine.toml")
     assert (plan.body.name, plan.body.mass_kg) == ("mine", 0.2)
-
-
-def test_body_sheet_errors_name_the_sheet(tmp_path):
-    (tmp_path / "mine.toml").write_text('like = "epuck2"\nmass_kg = -1\n')
-    with pytest.raises(BadInput, match=r"mine\.toml: mass_kg: expected more than 0 kg"):
+    sheet.write_text('like = "epuck2"\nmass_kg = -1\n')
+    with refused_input(sheet, "mass_kg"):
         _plan(folder=tmp_path, body="mine.toml")
 
 
 def test_policy_runs_only_on_the_body_of_its_training(tmp_path):
-    fitting = saved(tmp_path / "fitting.onnx", "epuck2", PolicyIO(sensors=("proximity",)))
-    plan = _plan(agent=str(fitting))
-    assert (plan.agent.needs, agent_sha256(plan.agent)) == (
-        ("proximity",),
-        hashlib.sha256(fitting.read_bytes()).hexdigest(),
+    fitting, other = (
+        saved(tmp_path / f"{body}.onnx", body, PolicyIO(sensors=("proximity",))) for body in ("epuck2", "footbot")
     )
-    other = saved(tmp_path / "other.onnx", "footbot", PolicyIO(sensors=("proximity",)))
-    with pytest.raises(BadInput, match=r"robot\.toml: agent: other\.onnx was trained for another body than epuck2"):
+    agent = _plan(agent=str(fitting)).agent
+    assert agent.needs == ("proximity",)
+    assert agent_sha256(agent) == hashlib.sha256(fitting.read_bytes()).hexdigest()
+    with refused_input("robot.toml", "agent", "was trained for another body than epuck2"):
         _plan(agent=str(other))
-
-
-def test_agent_sha256_identifies_the_code():
-    assert agent_sha256(_plan().agent) == hashlib.sha256(PLAYERS.read_bytes()).hexdigest()
 
 
 def test_radio_needs_in_a_world_are_checked_after_joining():
     medium = {"radio.kind": "world", "network.connect": ["tcp/127.0.0.1:7447"]}
     assert _plan("Ranging", **medium).settings.radio.kind == "world"
-    with pytest.raises(BadInput, match="a real radio does not measure it: expected tracker = true"):
+    with refused_input("robot.toml", "agent"):
         _plan("Ranging", **{**medium, "radio.kind": "zenoh"})
 
 
@@ -289,9 +267,8 @@ def test_shipped_drivers_are_installed():
 
 
 def test_unknown_driver_is_refused_with_the_installed_ones():
-    with pytest.raises(BadInput, match=r"robot.toml: driver.name: .*epuck2.*ros2") as refused:
+    with refused_input("robot.toml", "driver.name", r"epuck2.*ros2.*epuck3"):
         load_driver("epuck3", "robot.toml", "driver.name")
-    assert "epuck3" in str(refused.value)
 
 
 def _offer(
@@ -332,11 +309,8 @@ UNMET = {
 @pytest.mark.parametrize("need", UNMET)
 def test_unmet_needs_are_refused_with_a_remedy(need):
     offer, message = UNMET[need]
-    with pytest.raises(BadInput) as refused:
+    with refused_input("robot.toml", "agent", f"Mine needs {need!r}, which .*{re.escape(message)}"):
         check_needs("Mine", ("proximity", need), offer, "robot.toml")
-    assert str(refused.value).startswith(f"robot.toml: agent: Mine needs {need!r}, which ")
-    assert message in str(refused.value)
-    assert "\n" not in str(refused.value)
 
 
 def test_tracker_replaces_only_sensors_that_the_driver_lacks():
@@ -346,17 +320,17 @@ def test_tracker_replaces_only_sensors_that_the_driver_lacks():
 
 
 def test_speed_limits_default_to_half_the_body_limits():
-    limits = limits_for(EPUCK2, None, None, "robot.toml")
+    limits = limits_for(BODY, None, None, "robot.toml")
     assert limits.linear_mps == pytest.approx(0.0691)
     assert limits.angular_radps == pytest.approx(0.1382 / 0.053)
-    raised = limits_for(EPUCK2, 0.1382, 5.0, "robot.toml")
+    raised = limits_for(BODY, 0.1382, 5.0, "robot.toml")
     assert (raised.linear_mps, raised.angular_radps) == (0.1382, 5.0)
 
 
 @pytest.mark.parametrize(("limits", "key"), [((0.14, None), "max_linear_mps"), ((None, 5.3), "max_angular_radps")])
 def test_speed_limits_above_the_body_limits_are_refused(limits, key):
-    with pytest.raises(BadInput, match=f"robot.toml: {key}: expected at most .* which the epuck2 can do"):
-        limits_for(EPUCK2, *limits, "robot.toml")
+    with refused_input("robot.toml", key):
+        limits_for(BODY, *limits, "robot.toml")
 
 
 @given(SPEEDS, SPEEDS, SPEEDS)
@@ -372,12 +346,9 @@ def test_speed_limits_scale_commands_and_keep_their_curve(linear, angular, later
     assert got is command or got != command
 
 
-def test_speed_limits_leave_slower_commands_unchanged():
+def test_speed_limits_leave_slower_commands_and_the_direction_of_infinite_ones():
     command = Command(0.05, -1.0)
     assert LIMITS.clipped(command) is command
-
-
-def test_infinite_speeds_keep_their_direction():
     got = LIMITS.clipped(Command(math.inf, 1.0))
     assert got.linear_mps == pytest.approx(0.1)
     assert abs(got.angular_radps) < 1e-3
