@@ -13,15 +13,21 @@ from swarmwire.agent.behaviours import (
     Aggregation,
     Avoidance,
     BeaconAvoidance,
+    Consensus,
     Coverage,
     Diffusion,
     Flocking,
     LennardJonesFlocking,
     MinimalistFlocking,
     PsoModel,
+    PsoSearch,
+    PsoSearchPositioned,
     RandomWalk,
     SmoothedAvoidance,
     SmoothedAvoidanceProximity,
+    ThresholdRule,
+    ThresholdRuleProximity,
+    Vicsek,
 )
 from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.agent.parameters import BadParameter, checked_parameters, parameters_of
@@ -109,7 +115,7 @@ def test_diffusion_head_on_drives_straight_until_the_mean_vector_is_long(gap_m: 
 
 
 def test_diffusion_reaches_the_threshold_at_1_65_cm() -> None:
-    assert command(Diffusion, rays_at_wall(0.0167, 0.0)) == STRAIGHT
+    assert command(Diffusion, NOTHING) == command(Diffusion, rays_at_wall(0.0167, 0.0)) == STRAIGHT
     assert command(Diffusion, rays_at_wall(0.0163, 0.0))[1] != 0.0
 
 
@@ -125,10 +131,6 @@ def test_diffusion_turns_away_from_a_wall_that_is_not_dead_ahead(
     assert np.rad2deg(np.arctan2(y, x)) == pytest.approx(angle_deg, abs=0.06)
     assert command(Diffusion, value) == pytest.approx(LEFT)  # the wall is to the right
     assert command(Diffusion, value[::-1]) == pytest.approx(RIGHT)
-
-
-def test_diffusion_drives_straight_without_near_objects() -> None:
-    assert command(Diffusion, NOTHING) == STRAIGHT
 
 
 @pytest.mark.parametrize("normal_deg", [30, 90, 150, 180, -30, -90, -150])
@@ -161,13 +163,10 @@ def test_flocking_turns_to_the_neighbours_heading_at_any_compass_reading(own_rad
     assert (linear, angular) == pytest.approx(same, abs=1e-6)  # headings travel as f4
 
 
-def test_flocking_alone_drives_ahead() -> None:
-    assert command(Flocking, NOTHING) == (0.1, 0.0)
-
-
 def test_flocking_turn_does_not_grow_with_the_number_of_neighbours() -> None:
     neighbours = [(0.9, 0.8, 0.4)]
     assert turn_of(neighbours * 5) == pytest.approx(turn_of(neighbours))
+    assert command(Flocking, NOTHING) == (0.1, 0.0)
 
 
 @pytest.mark.parametrize("normal_deg", [10, 30, 80, -10, -30, -80])
@@ -249,10 +248,37 @@ def test_avoidance_is_the_same_in_a_mirror(value: list[float], safe_m: float) ->
         assert command(Avoidance, rays[::-1], safe_m=safe_m) == (linear, -angular)
 
 
-@pytest.mark.parametrize("body", ["epuck", "footbot"])
-@pytest.mark.parametrize("seed", [1, 2])
-def test_avoidance_rows_are_independent(body: str, seed: int) -> None:
-    assert_rows_independent(Avoidance, Trial(seed=seed, body=body))
+OFTEN = {"update_every_ticks": 3, "tell_before_ticks": 1}
+RING = {"ring_count": 7, "ring_index": [0, 1, 2, 3, 4, 5, 6]}
+INDEPENDENCE: list[tuple[type[VectorAgent], Trial]] = [
+    *((kind, Trial(ticks=30)) for kind in (Aggregation, Coverage, RandomWalk)),
+    *((Avoidance, Trial(seed=seed, body=body)) for seed in (1, 2) for body in ("epuck", "footbot")),
+    (BeaconAvoidance, Trial(seed=1, ticks=25)),
+    (BeaconAvoidance, Trial(seed=2, robots=14, ticks=25)),
+    (Consensus, Trial(body="point", params={"start_width": 1.0})),
+    *((kind, Trial()) for kind in (Diffusion, Flocking)),
+    (LennardJonesFlocking, Trial(body="footbot")),
+    (MinimalistFlocking, Trial(body="flockbot")),
+    (MinimalistFlocking, Trial(body="flockbot", seed=2, params={"random_turn": 0.5})),
+    *(
+        (kind, Trial(body="epuck-gps", params={**OFTEN, **more}))
+        for kind in (PsoModel, PsoSearch, PsoSearchPositioned)
+        for more in ({}, RING, {"keeps_received": False, "again_m": 0.5})
+    ),
+    *((kind, Trial(body="turtlebot3-burger")) for kind in (SmoothedAvoidance, ThresholdRule)),
+    *((kind, Trial(body="footbot")) for kind in (SmoothedAvoidanceProximity, ThresholdRuleProximity)),
+    *((kind, Trial(body="epuck", seed=2)) for kind in (SmoothedAvoidanceProximity, ThresholdRuleProximity)),
+    (Vicsek, Trial(body="point")),
+]
+
+
+@pytest.mark.parametrize(("kind", "trial"), INDEPENDENCE, ids=lambda value: getattr(value, "__name__", None))
+def test_behaviour_rows_are_independent(kind: type[VectorAgent], trial: Trial) -> None:
+    assert_rows_independent(kind, trial)
+
+
+def test_behaviours_all_have_a_trial_of_independence() -> None:
+    assert {kind.__name__ for kind, _ in INDEPENDENCE} == set(behaviours.__all__)
 
 
 def pairs(names_by_kind: dict[type, tuple[str, ...]]) -> list[Any]:

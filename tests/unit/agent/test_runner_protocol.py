@@ -203,9 +203,7 @@ def test_runner_with_robots_leaves_by_a_frame_and_waits_for_confirmation(state: 
 
 
 @pytest.mark.parametrize("confirmation", [lambda protocol: protocol.world_present(False), RunnerProtocol.leave])
-def test_runner_that_leaves_ends_without_a_confirmation(
-    confirmation: Callable[[RunnerProtocol], object],
-) -> None:
+def test_runner_that_leaves_ends_without_a_confirmation(confirmation: Callable[[RunnerProtocol], object]) -> None:
     protocol = in_state("leaving")
     confirmation(protocol)
     assert protocol.next_event() == Ended("left")

@@ -10,7 +10,7 @@ import pytest
 from swarmwire.agent import Agent, Memory, Robot, Robots, VectorAgent
 from swarmwire.agent.agent import AgentClass, load_agent
 from swarmwire.agent.agent_group import agent_group
-from swarmwire.agent.behaviours import Diffusion, Flocking
+from swarmwire.agent.behaviours import Flocking
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets
@@ -35,7 +35,7 @@ NOTHING: ReceivedPackets = received_from(SentPackets.none(), [])
 
 
 @pytest.mark.parametrize("trial", TRIALS, ids=repr)
-@pytest.mark.parametrize("kind", [Diffusion, Flocking, VectorCounter])
+@pytest.mark.parametrize("kind", [Flocking, VectorCounter])
 def test_honest_rows_are_independent(kind: type[VectorAgent], trial: Trial) -> None:
     assert_rows_independent(kind, trial)
 

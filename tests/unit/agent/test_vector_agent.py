@@ -14,7 +14,6 @@ from swarmwire.agent import (
     IntColumn,
     Memory,
     PerRobot,
-    Robot,
     Robots,
     VectorAgent,
     column,
@@ -31,8 +30,9 @@ from tests.support.agent.players import Crowd, Steps, Table, VectorCounter
 rows_ = st.lists(st.integers(0, 9), unique=True).map(sorted)
 
 
-def test_memory_of_a_new_robot_has_the_defaults() -> None:
-    memory = Table.fresh(3)
+def test_memory_of_a_new_robot_has_the_defaults_in_its_own_arrays() -> None:
+    memory, other = Table.fresh(3), Table.fresh(3)
+    other.x += 1.0
     assert (memory.x.tolist(), memory.n.tolist()) == ([0.5] * 3, [-1] * 3)
     assert (memory.x.dtype, memory.n.dtype) == (np.float64, np.int64)
     assert len(Table.fresh(0).x) == 0
@@ -66,12 +66,6 @@ def test_wide_column_has_several_numbers_per_robot_and_moves_with_it() -> None:
     assert memory.slots.tolist() == [[8] * 3] * 2
 
 
-def test_memory_tables_share_no_arrays() -> None:
-    first, second = Table.fresh(1), Table.fresh(1)
-    first.x += 1.0
-    assert second.x.tolist() == [0.5]
-
-
 def test_unknown_column_is_refused() -> None:
     memory = Table.fresh(1)
     with pytest.raises(AttributeError, match="Table has no column 'y'; it has x, n"):
@@ -80,14 +74,18 @@ def test_unknown_column_is_refused() -> None:
         memory.columns = {}
 
 
-def test_column_of_another_type_is_refused_at_its_declaration() -> None:
-    message = r"expected FloatColumn, IntColumn or BoolColumn = column\(default\)"
-    with pytest.raises(TypeError, match=message):
-        type("Plain", (Memory,), {"__annotations__": {"x": float}, "x": column(0.0)})
-    with pytest.raises(TypeError, match=message):
-        type("Bare", (Memory,), {"__annotations__": {"x": FloatColumn}})
-    with pytest.raises(TypeError, match=message):
-        type("Start", (Memory,), {"__annotations__": {"x": FloatColumn}, "x": 0.0})
+@pytest.mark.parametrize(
+    ("hints", "values", "fault"),
+    [
+        ({"x": float}, {"x": column(0.0)}, r"Odd\.x: expected FloatColumn"),
+        ({"x": FloatColumn}, {}, r"Odd\.x: expected FloatColumn"),
+        ({"x": FloatColumn}, {"x": 0.0}, r"Odd\.x: expected FloatColumn"),
+        ({"moved": FloatColumn}, {"moved": column(0.0)}, r"Odd\.moved: .*reserved"),
+    ],
+)
+def test_column_of_another_type_or_a_reserved_name_is_refused(hints: Any, values: Any, fault: str) -> None:
+    with pytest.raises(TypeError, match=fault):
+        type("Odd", (Memory,), {"__annotations__": hints, **values})
 
 
 def test_column_refuses_values_that_it_cannot_represent() -> None:
@@ -99,11 +97,6 @@ def test_column_refuses_values_that_it_cannot_represent() -> None:
     assert memory.n.tolist() == [-1, -1]
     memory.x = 3
     assert memory.x.tolist() == [3.0, 3.0]
-
-
-def test_column_cannot_have_the_name_of_a_method() -> None:
-    with pytest.raises(TypeError, match=r"Bad\.moved: the name is reserved by Memory"):
-        type("Bad", (Memory,), {"__annotations__": {"moved": FloatColumn}, "moved": column(0.0)})
 
 
 def test_memory_inherits_columns_without_changing_its_base() -> None:
@@ -128,12 +121,13 @@ def test_memory_rows_move_with_their_robots(old: list[int], new: list[int]) -> N
 
 
 def test_agent_has_the_memory_of_its_class() -> None:
-    class Derived(VectorCounter): ...
-
-    assert memory_class(VectorCounter) is Steps
-    assert memory_class(Derived) is Steps
-    assert memory_class(Crowd) is Memory
-    assert memory_class(VectorAgent) is Memory
+    derived = type("Derived", (VectorCounter,), {})
+    assert [memory_class(kind) for kind in (VectorCounter, derived, Crowd, VectorAgent)] == [
+        Steps,
+        Steps,
+        Memory,
+        Memory,
+    ]
 
 
 class Lanes(VectorAgent):
@@ -158,11 +152,7 @@ def test_parameter_list_shows_the_values_of_acting_robots():
     assert turns([2, 5, 9], [2, 5, 9], lane=[1, 2, 3]) == [2.0, 4.0, 6.0]
     assert turns([2, 5, 9], [9], lane=[1, 2, 3]) == [6.0]
     assert turns([2, 5, 9], [2, 9], lane=4) == [8.0, 8.0]
-
-
-def test_rows_with_per_robot_parameters_are_independent():
-    lanes = {"lane": list(range(7)), "speed_mps": 0.1}
-    assert_rows_independent(Lanes, Trial(robots=7, params=lanes))
+    assert_rows_independent(Lanes, Trial(robots=7, params={"lane": list(range(7)), "speed_mps": 0.1}))
 
 
 @pytest.mark.parametrize(
@@ -181,10 +171,6 @@ def test_per_robot_values_of_another_form_are_refused(params, text):
 
 
 def test_per_robot_parameters_need_a_vector_agent():
-    class Lone(Agent):
-        lane: PerRobot[int]
-
-        def step(self, robot: Robot) -> None: ...
-
+    lone = type("Lone", (Agent,), {"__annotations__": {"lane": PerRobot[int]}, "step": lambda *_: None})
     with pytest.raises(TypeError, match="only a VectorAgent"):
-        parameters_of(Lone)
+        parameters_of(lone)

@@ -9,13 +9,10 @@ from swarmwire.agent.behaviours import PsoModel, PsoSearch, PsoSearchPositioned
 from swarmwire.agent.behaviours.pso.core import ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestVector
 from swarmwire.agent.parameters import BadParameter, checked_parameters
-from swarmwire.agent.testing import Trial, assert_rows_independent
 from tests.support.agent.behaviours import START, SingleParticle, best_at
 
 FURTHEST_M = 0.1 * 10.0  # speed x time between two updates
 CALM = {"inertia": 0.0, "own_weight": 0.0, "neighbour_weight": 0.0}  # the robot stays where it is
-OFTEN = {"update_every_ticks": 3, "tell_before_ticks": 1}
-RING = {"ring_count": 7, "ring_index": [0, 1, 2, 3, 4, 5, 6]}
 AGAIN_M = 0.1
 SPEED_MPS, PERIOD_S = 0.1, 0.1
 
@@ -113,16 +110,6 @@ def test_personal_best_is_sent_once_per_period_a_second_before_its_end(kind: typ
     assert [tick for tick, packets in enumerate(sent) if packets] == [90, 190, 290]
 
 
-def test_personal_best_is_sent_as_its_position() -> None:
-    robot = SingleParticle(PsoSearchPositioned, update_every_ticks=3, tell_before_ticks=1)
-    robot.brightness = 0.75
-    robot.step()
-    robot.position, robot.brightness = (0.0, 0.0), 0.5
-    robot.step()
-    (payload,) = [actions.sent.payloads.row(0) for actions in robot.steps(1)]
-    assert payload == best_at(0.75, *START).encode()
-
-
 def test_robot_turns_to_its_target_and_waits_there() -> None:
     robot = SingleParticle(**CALM)
     robot.step()
@@ -150,19 +137,14 @@ def test_robot_turns_from_a_near_object_on_its_way_to_the_target(ray: int, side:
 
 
 @pytest.mark.parametrize(
-    ("index", "width", "heeded"), [(0, 1, 9), (0, 4, 6), (0, 5, 5), (4, 1, 5), (3, 1, 4), (2, 2, 4)]
+    ("count", "index", "width", "heeded"),
+    [(10, 0, 1, 9), (10, 0, 4, 6), (10, 0, 5, 5), (10, 4, 1, 5), (10, 3, 1, 4), (10, 2, 2, 4), (0, 0, 1, 5)],
 )
-def test_ring_limits_neighbours_to_adjacent_indices(index: int, width: int, heeded: int) -> None:
-    """Of senders 1 to 9 the nearer to 5 is the brighter, above 5 a little more so than below."""
-    robot = SingleParticle(ring_count=10, ring_index=index, ring_width=width)
+def test_ring_limits_neighbours_to_adjacent_indices(count: int, index: int, width: int, heeded: int) -> None:
+    """Of senders 1 to 9 the nearer to 5 is the brighter, above 5 a little more so than below; no ring limits none."""
+    robot = SingleParticle(ring_count=count, ring_index=index, ring_width=width)
     robot.step(*(best_at(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
     assert robot.vector("neighbour")[0] == pytest.approx(heeded - 1.0)
-
-
-def test_ring_count_zero_accepts_all_received_bests() -> None:
-    robot = SingleParticle()
-    robot.step(*(best_at(8.0 - abs(sender - 5.1), float(sender), 0.0) for sender in range(1, 10)))
-    assert robot.vector("neighbour")[0] == pytest.approx(4.0)
 
 
 @pytest.mark.parametrize(
@@ -182,16 +164,11 @@ def test_ring_parameters_are_checked_before_a_run(params: dict[str, Any], key: s
 
 
 def test_ring_defaults_of_a_class_are_checked() -> None:
-    class Ringed(PsoSearch):
-        ring_count: int = 10
-
+    ringed = type("Ringed", (PsoSearch,), {"__annotations__": {"ring_count": int}, "ring_count": 10})
     with pytest.raises(BadParameter, match="0 to 9, got 0"):
-        checked_parameters(Ringed, {}, robots=3)
-    assert checked_parameters(Ringed, {"ring_index": [0, 1, 9]}, robots=3) == {"ring_index": [0, 1, 9]}
-    assert checked_parameters(Ringed, {"ring_count": 0}, robots=3) == {"ring_count": 0}
-
-
-def test_ring_index_of_one_robot_is_a_single_number() -> None:
+        checked_parameters(ringed, {}, robots=3)
+    for params in ({"ring_index": [0, 1, 9]}, {"ring_count": 0}):
+        assert checked_parameters(ringed, params, robots=3) == params
     assert checked_parameters(PsoSearch, {"ring_count": 3, "ring_index": 2})["ring_index"] == 2
 
 
@@ -207,29 +184,18 @@ def test_received_bests_expire_after_the_update_unless_kept() -> None:
     assert forgetting.memory.neighbour_brightness[0] < 0.0
 
 
-@pytest.mark.parametrize("kind", [PsoSearch, PsoSearchPositioned, PsoModel])
-@pytest.mark.parametrize("more", [{}, RING, {"keeps_received": False, "again_m": 0.5}])
-def test_pso_rows_are_independent(kind: Any, more: dict[str, Any]) -> None:
-    assert_rows_independent(kind, Trial(body="epuck-gps", params={**OFTEN, **more}))
-
-
-def test_personal_best_is_the_brightest_reading_by_default() -> None:
-    robot = SingleParticle()
-    for brightness in (0.5, 0.9, 0.4, 0.6):
-        robot.brightness = brightness
+@pytest.mark.parametrize(("again_m", "brightness", "readings", "away_m"), [(AGAIN_M, 0.6, 3, 0.0), (0.0, 0.9, 1, 0.05)])
+def test_readings_near_the_personal_best_are_averaged_at_its_position(
+    again_m: float, brightness: float, readings: int, away_m: float
+) -> None:
+    """If it is measured again; else it is the brightest reading."""
+    robot = SingleParticle(again_m=again_m)
+    for x_m, value in ((0.0, 0.5), (0.05, 0.9), (0.09, 0.4)):
+        robot.position, robot.brightness = (START[0] + x_m, START[1]), value
         robot.step()
-    assert robot.memory.personal_brightness[0] == pytest.approx(0.9)
-    assert robot.memory.personal_readings[0] == 1
-
-
-def test_readings_near_the_personal_best_are_averaged_at_its_position() -> None:
-    robot = SingleParticle(again_m=AGAIN_M)
-    for away_m, brightness in ((0.0, 0.5), (0.05, 0.9), (0.09, 0.4)):
-        robot.position, robot.brightness = (START[0] + away_m, START[1]), brightness
-        robot.step()
-    assert robot.memory.personal_brightness[0] == pytest.approx(0.6)
-    assert robot.memory.personal_readings[0] == 3
-    assert robot.vector("personal") == pytest.approx((-0.09, 0.0))
+    assert robot.memory.personal_brightness[0] == pytest.approx(brightness)
+    assert robot.memory.personal_readings[0] == readings
+    assert robot.vector("personal") == pytest.approx((away_m - 0.09, 0.0))
 
 
 def test_personal_best_far_away_is_replaced_only_by_more_than_the_mean() -> None:
@@ -246,21 +212,25 @@ def test_personal_best_far_away_is_replaced_only_by_more_than_the_mean() -> None
     assert (robot.memory.personal_brightness[0], robot.memory.personal_readings[0]) == (pytest.approx(0.8), 1)
 
 
-def test_personal_best_is_measured_again_on_return_and_its_mean_sent() -> None:
-    robot = SingleParticle(again_m=AGAIN_M, update_every_ticks=5, tell_before_ticks=1)
+@pytest.mark.parametrize(("again_m", "brightness"), [(AGAIN_M, (1.0 + 0.5) / 2.0), (0.0, 1.0)])
+def test_personal_best_is_sent_with_the_mean_of_readings_on_return_if_measured_again(again_m, brightness) -> None:
+    robot = SingleParticle(again_m=again_m, update_every_ticks=5, tell_before_ticks=1)
     robot.brightness = 1.0
     robot.step()
     robot.position, robot.brightness = (START[0] + 1.0, START[1]), 0.1
     robot.steps(2)
     robot.position, robot.brightness = START, 0.5
     robot.step()
+    robot.position, robot.brightness = (START[0] + 0.5, START[1]), 0.1
     (payload,) = [actions.sent.payloads.row(0) for actions in robot.steps(1)]
-    assert payload == best_at((1.0 + 0.5 + 0.5) / 3.0, *START).encode()
+    assert payload == best_at(brightness, *START).encode()
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0, -2.0])
-def test_particle_flies_straight_to_its_target_at_any_heading(heading_rad: float) -> None:
+@pytest.mark.parametrize("rays", [0.0, 1.0])
+def test_particle_flies_straight_to_its_target_at_any_heading_through_objects(heading_rad: float, rays: float) -> None:
     robot = SingleParticle(PsoModel)
+    robot.rays[:] = rays
     robot.step()
     robot.heading_rad = heading_rad
     actions = robot.step()
@@ -285,11 +255,3 @@ def test_particle_stops_at_its_target() -> None:
     assert np.hypot(actions.linear_mps[0], actions.lateral_mps[0]) * PERIOD_S == pytest.approx(short_m)
     robot.position = (START[0] + x, START[1] + y)
     assert robot.step().linear_mps[0] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_particle_avoids_nothing() -> None:
-    free, blocked = SingleParticle(PsoModel), SingleParticle(PsoModel)
-    blocked.rays[:] = 1.0
-    for _ in range(3):
-        expected, actual = free.step(), blocked.step()
-        assert expected.linear_mps[0] == actual.linear_mps[0]

@@ -21,7 +21,6 @@ from swarmwire.agent.behaviours.beacon_avoidance import SLOTS, NeighbourTable, S
 from swarmwire.agent.behaviours.beacon_avoidance import Beacon as BeaconPacket
 from swarmwire.agent.behaviours.random_walk import Present
 from swarmwire.agent.fields import Vectors
-from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.sentinels import NO_ROBOT
@@ -40,11 +39,6 @@ SHOWN = Path(__file__).parents[4] / "scenarios" / "behaviours"
 ON, BACK = (0.2, 0.0), (-0.1, 0.5)  # the article's numbers
 
 
-@pytest.mark.parametrize("kind", [RandomWalk, Coverage, Aggregation])
-def test_walking_rows_are_independent(kind):
-    assert_rows_independent(kind, Trial(ticks=30))
-
-
 @pytest.mark.parametrize("persistence", [0.0, 0.3, 0.8])
 def test_persistence_is_the_mean_cosine_of_the_turns(persistence):
     turned = Walker(RandomWalk, n=MANY, persistence=persistence).first_turns_rad()
@@ -52,10 +46,11 @@ def test_persistence_is_the_mean_cosine_of_the_turns(persistence):
     assert np.mean(np.sin(turned)) == pytest.approx(0.0, abs=4.0 / MANY**0.5)
 
 
-def test_persistence_of_one_never_turns():
+def test_persistence_of_one_never_turns_nor_from_an_obstacle_behind():
     walker = Walker(RandomWalk, n=20, persistence=1.0, spell_m=0.1)
     for _ in range(50):
         assert np.abs(walker.step().angular_radps).max() < 1e-12
+    assert (Walker(RandomWalk, n=20, persistence=1.0).step(near_rad=np.pi).linear_mps == 0.1).all()
 
 
 def test_spells_are_exponential_or_constant():
@@ -81,11 +76,6 @@ def test_heading_after_an_obstacle_is_on_the_half_circle_away_from_it(near_rad):
     away = np.cos(turned - near_rad)
     assert away.max() < 0.35, "rays stand up to 40 degrees apart, so that their sum does not show quite where"
     assert away.min() < -0.95
-
-
-def test_obstacle_behind_is_ignored():
-    walker = Walker(RandomWalk, n=20, persistence=1.0)
-    assert (walker.step(near_rad=np.pi).linear_mps == 0.1).all()
 
 
 def turns(*neighbours: tuple[float, float], **params: float) -> np.ndarray:
@@ -136,20 +126,18 @@ def test_aggregation_approaches_the_majority_at_any_range():
     assert 0.0 < turned[0] < 1.0
 
 
-@pytest.mark.parametrize(("neighbours", "held"), [([], 1.0), ([NEAR], 4.0), ([NEAR, NEAR, NEAR], 16.0), ([FAR], 1.0)])
-def test_aggregation_leaves_less_often_with_more_near_neighbours(neighbours, held):
-    many = gatherers(MANY, leave_per_s=5.0, return_per_s=0.0)
+@pytest.mark.parametrize(
+    ("neighbours", "crowding", "held"),
+    [([], None, 1.0), ([NEAR], None, 4.0), ([NEAR] * 3, None, 16.0), ([FAR], None, 1.0), ([NEAR] * 3, 0.0, 1.0)],
+)
+def test_aggregation_leaves_less_often_with_more_near_neighbours(neighbours, crowding, held):
+    """By the default crowding; with none their number does not matter."""
+    params = {} if crowding is None else {"crowding": crowding}
+    many = gatherers(MANY, leave_per_s=5.0, return_per_s=0.0, **params)
     many.step(NEAR)
     many.step(*neighbours)
     left = np.mean(many.memory.phase == REPEL)
     assert left == pytest.approx(1.0 - np.exp(-0.5 / held), abs=4.0 * (0.25 / MANY) ** 0.5)
-
-
-def test_aggregation_with_zero_crowding_ignores_the_number_of_neighbours():
-    many = gatherers(MANY, leave_per_s=5.0, return_per_s=0.0, crowding=0.0)
-    many.step(NEAR)
-    many.step(NEAR, NEAR, NEAR)
-    assert np.mean(many.memory.phase == REPEL) == pytest.approx(1.0 - np.exp(-0.5), abs=0.04)
 
 
 def test_aggregation_repels_after_leaving_then_approaches_again():
@@ -157,10 +145,9 @@ def test_aggregation_repels_after_leaving_then_approaches_again():
     robot.step(NEAR)
     robot.step(NEAR)
     assert (robot.memory.phase == REPEL).all()
-    back = float(robot.memory.turn_rad[0]) + 0.1 * 2.0 * np.sign(
-        robot.memory.turn_rad[0]
-    )  # with what it has turned by now
-    assert np.cos(back - 0.4) == pytest.approx(-1.0)
+    left_rad = float(robot.memory.turn_rad[0])
+    back_rad = left_rad + 0.1 * 2.0 * np.sign(left_rad)  # with what it has turned by now
+    assert np.cos(back_rad - 0.4) == pytest.approx(-1.0)
     many = gatherers(MANY, leave_per_s=1e9, return_per_s=2.0)
     many.step(NEAR)
     many.step(NEAR)
@@ -201,11 +188,8 @@ class BeaconRobot:
         return float(self.memory.x_m[0, 0]), float(self.memory.y_m[0, 0])
 
 
-def test_beacon_avoidance_drives_straight_without_neighbours() -> None:
+def test_beacon_avoidance_keeps_its_course_and_returns_to_it() -> None:
     assert BeaconRobot(2.0).steps(3) == (0.1, 0.0)
-
-
-def test_beacon_avoidance_returns_to_its_course() -> None:
     robot = BeaconRobot(0.0)
     robot.step()
     robot.heading_rad = 0.5
@@ -215,14 +199,10 @@ def test_beacon_avoidance_returns_to_its_course() -> None:
 
 
 @pytest.mark.parametrize("heading_rad", [0.0, 2.0, -3.0])
-def test_head_on_neighbour_is_passed_on_the_right(heading_rad: float) -> None:
-    robot = BeaconRobot(heading_rad)
-    assert robot.step((0.6, 0.0, heading_rad + np.pi, 0.1))[1] < 0.0
-
-
-@pytest.mark.parametrize("side", [1.0, -1.0])
-def test_neighbour_on_one_side_is_passed_on_the_other(side: float) -> None:
-    assert np.sign(BeaconRobot().step((0.6, side * 0.2, np.pi, 0.1))[1]) == -side
+def test_head_on_neighbour_is_passed_on_the_right_and_others_on_the_other_side(heading_rad: float) -> None:
+    for bearing_rad, turn in ((0.0, -1.0), (0.2, -1.0), (-0.2, 1.0)):
+        robot = BeaconRobot(heading_rad)
+        assert np.sign(robot.step((0.6, bearing_rad, heading_rad + np.pi, 0.1))[1]) == turn
 
 
 @pytest.mark.parametrize(
@@ -285,11 +265,6 @@ def test_neighbour_table_keeps_the_newest_packet_of_a_sender() -> None:
     assert table.age_s.tolist() == [[np.inf] * SLOTS]
 
 
-@pytest.mark.parametrize("trial", [Trial(seed=1, ticks=25), Trial(seed=2, robots=14, ticks=25)], ids=repr)
-def test_beacon_avoidance_rows_are_independent(trial: Trial) -> None:
-    assert_rows_independent(BeaconAvoidance, trial)
-
-
 class Alone:
     """One robot whose tests say what its rays see."""
 
@@ -320,11 +295,8 @@ def test_threshold_rule_backs_off_left_from_objects_on_any_side(angle_deg: float
     assert robot.sees() == ON
     assert robot.sees((angle_deg, 0.49)) == BACK
     assert robot.sees((angle_deg, 0.51)) == ON, "nothing is remembered"
-
-
-def test_threshold_rule_has_threshold_and_speeds_as_parameters() -> None:
-    robot = Alone(ThresholdRule, safe_m=0.3, speed_mps=0.15, back_mps=0.05, turn_radps=-1.0)
-    assert (robot.sees((0.0, 0.31)), robot.sees((0.0, 0.29))) == ((0.15, 0.0), (-0.05, -1.0))
+    other = Alone(ThresholdRule, safe_m=0.3, speed_mps=0.15, back_mps=0.05, turn_radps=-1.0)
+    assert (other.sees((angle_deg, 0.31)), other.sees((angle_deg, 0.29))) == ((0.15, 0.0), (-0.05, -1.0))
 
 
 def rays(*seen: tuple[int, float]) -> FloatArray:
@@ -371,26 +343,12 @@ def test_smoothed_avoidance_accelerates_with_its_time_constant() -> None:
 
 def test_smoothed_avoidance_keeps_its_side_while_blocked() -> None:
     """What is ahead seems now a little to the left, now a little to the right."""
-    steady, fickle = (
-        Alone(SmoothedAvoidance, smooth_s=0.0),
-        Alone(SmoothedAvoidance, smooth_s=0.0, blocked_rad=4.0),
-    )
+    steady, fickle = (Alone(SmoothedAvoidance, smooth_s=0.0, **more) for more in ({}, {"blocked_rad": 4.0}))
     where = [3.0, -3.0, 3.0, -3.0]
     assert {np.sign(steady.sees((angle, 0.25), wide_deg=40.0)[1]) for angle in where} == {-1.0}
     assert {np.sign(fickle.sees((angle, 0.25), wide_deg=40.0)[1]) for angle in where} == {-1.0, 1.0}
     assert steady.sees() == ON, "nothing is in its way any more"
     assert steady.sees((-3.0, 0.25), wide_deg=40.0)[1] > 0.0, "and the side is chosen anew"
-
-
-@pytest.mark.parametrize("kind", [ThresholdRule, SmoothedAvoidance])
-def test_scan_avoidance_rows_are_independent(kind: type[VectorAgent]) -> None:
-    assert_rows_independent(kind, Trial(body="turtlebot3-burger"))
-
-
-@pytest.mark.parametrize("kind", [ThresholdRuleProximity, SmoothedAvoidanceProximity])
-def test_proximity_avoidance_rows_are_independent(kind: type[VectorAgent]) -> None:
-    assert_rows_independent(kind, Trial(body="footbot"))
-    assert_rows_independent(kind, Trial(body="epuck", seed=2))
 
 
 def test_smoothed_avoidance_prevents_contacts_of_the_threshold_rule() -> None:
