@@ -119,15 +119,12 @@ def test_grid_finds_neighbours_on_cell_borders(reach_m: float, clamps: bool) -> 
         assert set(np.flatnonzero(near[k])) <= listed
 
 
-def test_floor_is_white_by_default():
-    assert shade_at(ground_of(None, SIZE_M, "walls"), 0.3, 0.4) == 1.0
-
-
 def test_floor_shade_is_that_of_the_last_patch_rim_included():
     ground = ground_of(Floor(0.9, (DISC, TRIANGLE)), SIZE_M, "walls")
     at = {(1.0, 0.0): 0.4, (1.0, 0.3): 0.4, (1.2, -0.2): 0.4, (1.15, 0.2): 0.2, (1.5, 0.0): 0.2, (1.6, 0.0): 0.9}
     assert {point: shade_at(ground, *point) for point in at} == at
     assert shade_at(ground_of(Floor(0.9, (TRIANGLE, DISC)), SIZE_M, "walls"), 1.0, 0.0) == 0.2
+    assert shade_at(ground_of(None, SIZE_M, "walls"), 0.3, 0.4) == 1.0
 
 
 def test_floor_image_is_stretched_over_the_arena():
@@ -224,49 +221,24 @@ def test_ray_along_the_sides_of_a_box(x: float, y: float, dx: float, dy: float, 
     assert ray_to(Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0)), x, y, dx, dy) == expected
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "expected"), [(-3.0, 0.0, 2.0), (3.0, 0.0, math.inf), (0.5, 0.0, 0.0), (-3.0, 1.1, math.inf)]
-)
-def test_ray_from_ahead_behind_and_inside_a_circle(x: float, y: float, expected: float) -> None:
-    assert ray_to_circle(x, y, 1.0, 0.0, 0.0, 0.0, 1.0) == expected
-
-
-@pytest.mark.parametrize(
-    ("arena", "line", "blocked"),
-    [
-        (0, (-1.0, 0.0, 1.0, 0.0), True),
-        (0, (-1.0, 0.0, -0.6, 0.0), False),  # ends before the cylinder
-        (0, (-1.0, 0.6, 1.0, 0.6), False),
-        (0, (2.65, -1.0, 2.65, 1.0), True),  # the corner of the turned box
-        (0, (2.75, -1.0, 2.75, 1.0), False),
-        (1, (-1.0, 0.0, 1.0, 0.0), False),
-        (2, (-1.0, 0.0, 1.0, 0.0), False),
-        (2, (0.0, 0.0, 0.0, 2.0), True),
-        (2, (1.0, 0.5, 1.0, 0.5), False),  # no line at all
-    ],
-)
-def test_line_of_sight_is_blocked_only_by_obstacles_of_its_arena(
-    arena: int, line: tuple[float, float, float, float], blocked: bool
-) -> None:
-    x0, y0, x1, y1 = line
-    obstacles = indexed(ARENAS, OBSTACLE_ARENA_M)
-    assert is_blocked(obstacles, arena, x0, y0, x1, y1, 0.0, 0.0) is blocked
-    assert is_blocked(obstacles, arena, x1, y1, x0, y0, 0.0, 0.0) is blocked
-
-
 def test_line_of_sight_is_equal_in_both_directions() -> None:
     obstacles = indexed(ARENAS, OBSTACLE_ARENA_M)
     for x0, y0, x1, y1 in np.random.default_rng(3).uniform(-3.0, 3.0, (500, 4)):
         assert is_blocked(obstacles, 0, x0, y0, x1, y1, 0.0, 0.0) == is_blocked(obstacles, 0, x1, y1, x0, y0, 0.0, 0.0)
 
 
-def test_obstacle_arrays_are_grouped_by_arena() -> None:
+def test_obstacle_arrays_are_grouped_by_arena_with_heights_that_default_to_infinity() -> None:
     obstacles = obstacle_arrays(ARENAS)
     assert obstacles.circle_start.tolist() == [0, 1, 1, 1]
     assert obstacles.polygon_start.tolist() == [0, 1, 1, 2]
     assert obstacles.circle.shape == (1, 3)
     assert obstacle_arrays(((), ())).polygon.shape == (0, 3)
     assert obstacles.side_start.tolist() == [0, 4, 8]
+    low, high = Obstacle("cylinder", 0.0, 0.0, radius_m=0.1, height_m=0.2), Obstacle("cylinder", 1.0, 0.0, radius_m=0.1)
+    box = Obstacle("box", 0.0, 1.0, size_m=(1.0, 1.0), height_m=0.5)
+    arrays = obstacle_arrays(((box, low), (high, box)))
+    assert arrays.circle_top_m.tolist() == [0.2, math.inf]
+    assert arrays.polygon_top_m.tolist() == [0.5, 0.5]
 
 
 def test_ray_ends_at_the_first_point_of_a_polygon() -> None:
@@ -298,23 +270,7 @@ def test_box_equals_the_polygon_of_its_corners() -> None:
     assert np.array_equal(box.corners_m, polygon.corners_m)
     for first, other in zip(obstacle_arrays(((box,),)), obstacle_arrays(((polygon,),)), strict=True):
         assert np.array_equal(first, other)
-
-
-def test_line_of_sight_is_blocked_through_a_polygon() -> None:
-    triangle = Obstacle("polygon", 0.0, 0.0, points_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
-    obstacles = indexed(((triangle,),), OBSTACLE_ARENA_M)
-    assert is_blocked(obstacles, 0, 0.6, 0.6, 0.2, 0.2, 0.0, 0.0)
-    assert not is_blocked(obstacles, 0, 0.6, 0.6, 1.0, 0.1, 0.0, 0.0)
-    assert not is_blocked(obstacles, 0, -0.1, -1.0, -0.1, 2.0, 0.0, 0.0)
     assert Obstacle("cylinder", 0.0, 0.0, radius_m=1.0).corners_m.shape == (0, 2)
-
-
-def test_obstacle_heights_default_to_infinity() -> None:
-    low, high = Obstacle("cylinder", 0.0, 0.0, radius_m=0.1, height_m=0.2), Obstacle("cylinder", 1.0, 0.0, radius_m=0.1)
-    box = Obstacle("box", 0.0, 1.0, size_m=(1.0, 1.0), height_m=0.5)
-    arrays = obstacle_arrays(((box, low), (high, box)))
-    assert arrays.circle_top_m.tolist() == [0.2, math.inf]
-    assert arrays.polygon_top_m.tolist() == [0.5, 0.5]
 
 
 def obstacles(seed: int, count: int) -> tuple[Obstacle, ...]:
@@ -360,11 +316,8 @@ def test_obstacles_within_reach_are_found_across_torus_edges(reach_m: float, tor
     arenas = obstacles(1, 24), (), obstacles(2, 8)
     things = obstacles_within(obstacle_arrays(arenas), OBSTACLE_ARENA_M, reach_m, torus)
     rows, random = np.empty(len(things.shape), np.int64), np.random.default_rng(3)
-    shifts = (
-        [(i * OBSTACLE_ARENA_M[0], j * OBSTACLE_ARENA_M[1]) for i in (-1, 0, 1) for j in (-1, 0, 1)]
-        if torus
-        else [(0.0, 0.0)]
-    )
+    turns = (-1, 0, 1) if torus else (0,)
+    shifts = [(i * OBSTACLE_ARENA_M[0], j * OBSTACLE_ARENA_M[1]) for i in turns for j in turns]
     spread = 0.5 if torus else 0.8  # in the open, robots leave the arena
     for x, y in (random.uniform(-spread, spread, (8 if torus else 60, 2)) * OBSTACLE_ARENA_M).tolist():
         for arena, arena_obstacles in enumerate(arenas):
@@ -419,24 +372,16 @@ def test_wrapped_angle_lies_in_the_interval_and_keeps_its_direction(angle: float
         assert abs(math.remainder(float(other(np.array(angle))) - wrapped, math.tau)) < 1e-13
 
 
-@given(st.floats(-math.pi, math.pi, exclude_min=True))
-def test_wrap_angle_keeps_angles_in_the_interval(angle: float):
-    assert wrap_angle(angle) == angle
-
-
 @given(st.floats(-3.0 * math.pi, 3.0 * math.pi))
 def test_wrap_angle_is_the_exact_remainder_up_to_three_half_turns(angle: float):
     exact = math.remainder(angle, math.tau)
     assert wrap_angle(angle) == (exact if exact > -math.pi else math.pi) or abs(exact) == math.pi
 
 
-def test_half_turn_wraps_to_plus_pi_or_by_modulo_to_minus_pi():
+def test_half_turn_wraps_to_plus_pi_or_by_modulo_to_minus_pi_and_nan_to_nan():
     ends = np.array([math.pi, -math.pi])
     assert wrap_angles(ends).tolist() == [math.pi, math.pi]
     assert wrap_by_modulo(ends).tolist() == [-math.pi, -math.pi]
-
-
-def test_nan_angle_stays_nan():
     assert math.isnan(wrap_angle(math.nan))
     assert np.isnan(wrap_angles(np.array([math.nan]))).all()
     assert wrap_angles(np.array([4.0, 7.0])) == pytest.approx([4.0 - math.tau, 7.0 - math.tau])
