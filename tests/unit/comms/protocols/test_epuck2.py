@@ -109,9 +109,6 @@ def test_led_of_one_colour_lights_from_half_intensity() -> None:
     shown = ALL_DARK.with_changed(ring | {8: 0xFF0000, 9: 0x008000}).shown(DARK)
     assert [shown[led] for led in (0, 2, 4, 6, 8, 9)] == [0xFF0000, 0, 0xFF0000, 0, 0xFF0000, 0x00FF00]
     assert ALL_DARK.with_changed({8: 0x00FFFF, 9: 0xFF7FFF}).switched == 0
-
-
-def test_led_with_an_unknown_number_is_refused() -> None:
     with pytest.raises(ValueError, match="0 to 9"):
         ALL_DARK.with_changed({10: 0xFF0000})
 
@@ -150,43 +147,38 @@ def tof() -> ScanSpec:
 
 @given(st.lists(SHARES, min_size=1, max_size=8).map(np.array))
 def test_sensor_shares_survive_within_half_a_step(value) -> None:
-    assert (
-        np.abs(readings.proximity(readings.to_proximity(value)) - value).max() <= 0.5 / readings.PROXIMITY_FULL + 1e-12
-    )
-    assert np.abs(readings.light(readings.to_light(value)) - value).max() <= 0.5 / readings.AMBIENT_DARK + 1e-12
-    shade = readings.shade(readings.to_shade(value), readings.GROUND_BLACK, readings.GROUND_WHITE)
-    assert np.abs(shade - value).max() <= 0.5 / (readings.GROUND_WHITE - readings.GROUND_BLACK) + 1e-12
+    black, white = readings.GROUND_BLACK, readings.GROUND_WHITE
+    for got, steps in (
+        (readings.proximity(readings.to_proximity(value)), readings.PROXIMITY_FULL),
+        (readings.light(readings.to_light(value)), readings.AMBIENT_DARK),
+        (readings.shade(readings.to_shade(value), black, white), white - black),
+    ):
+        assert np.abs(got - value).max() <= 0.5 / steps + 1e-12
 
 
 @given(st.floats(0.05, 1.99))
-def test_distance_survives_within_half_a_millimetre(range_m) -> None:
-    values = readings.distance_m(readings.to_distance(np.array([range_m]), tof()), tof())
+def test_distance_survives_within_half_a_millimetre_and_nothing_is_infinite(range_m) -> None:
+    raw = readings.to_distance(np.array([range_m, np.inf]), tof())
+    values = readings.distance_m(raw, tof())
     assert abs(float(values[0]) - range_m) <= 0.0005 + 1e-12
+    assert (raw[1], values[1]) == (readings.SEES_NOTHING_MM, np.inf)
 
 
-def test_distance_of_nothing_in_sight_is_infinite() -> None:
-    values = readings.to_distance(np.array([np.inf]), tof())
-    assert values.tolist() == [readings.SEES_NOTHING_MM]
-    assert np.isinf(readings.distance_m(values, tof())).all()
+@pytest.mark.parametrize(
+    ("encode", "values", "raw"),
+    [
+        (readings.to_light, [0.0, 0.5, 1.0], [4000.0, 2000.0, 0.0]),  # most in the dark
+        (readings.to_acceleration, [9.80665, -9.80665, 100.0], [800.0, -800.0, 1536.0]),  # 800 per g, up to a limit
+        (readings.to_turn, np.deg2rad([62.5, -62.5, 600.0]), [8192.0, -8192.0, 32767.0]),  # full at 250 degrees/s
+        (readings.to_voltage, [4.2, 3.4], [round(4.2 * 819.2), round(3.4 * 819.2)]),  # driver: raw / (4096 x 0.6 / 3.0)
+    ],
+)
+def test_sensor_values_read_as_in_the_fact_sheet_and_driver(encode, values, raw) -> None:
+    assert encode(np.array(values)).tolist() == raw
 
 
-def test_light_reads_4000_in_the_dark_and_less_in_brightness() -> None:
-    assert readings.to_light(np.array([0.0, 0.5, 1.0])).tolist() == [4000.0, 2000.0, 0.0]
-
-
-def test_acceleration_reads_800_per_g_up_to_the_limit() -> None:
-    assert readings.to_acceleration(np.array([9.80665, -9.80665, 100.0])).tolist() == [800.0, -800.0, 1536.0]
+def test_sensor_factors_are_those_of_the_fact_sheet_and_driver() -> None:
     assert pytest.approx(800.0) == 9.80665 * readings.PER_MPS2
-
-
-def test_gyro_saturates_at_250_degrees_per_second() -> None:
-    quarter = np.deg2rad(62.5)
-    assert readings.to_turn(np.array([quarter, -quarter, 10.0])).tolist() == [8192.0, -8192.0, 32767.0]
-
-
-def test_battery_voltage_reads_as_in_the_driver() -> None:
-    # GCtronic's driver: V = raw / (4096 x 0.6 / 3.0)
-    assert readings.to_voltage(np.array([4.2, 3.4])).tolist() == [round(4.2 * 819.2), round(3.4 * 819.2)]
     assert pytest.approx(819.2) == readings.PER_V
 
 

@@ -13,23 +13,6 @@ from zenoh.ext import Int64, z_deserialize, z_serialize
 
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.protocols.ros2 import keys, messages, readings
-from swarmwire.comms.protocols.ros2.keys import (
-    NAME,
-    READ,
-    WRITE,
-    Qos,
-    RmwNode,
-    absolute,
-    attachment,
-    bridge_itself,
-    bridge_key,
-    bridge_token,
-    check_attachment,
-    check_name,
-    publisher_id,
-    rmw_key,
-    ros_name,
-)
 from swarmwire.comms.protocols.ros2.laser import laser_scan
 from swarmwire.comms.protocols.ros2.messages import Messages, stamp_ns
 from swarmwire.comms.protocols.ros2.motion import Motion, WheelPoses, imu, joint_state
@@ -70,34 +53,31 @@ def test_type_hashes_match_rep_2016(kind):
     assert MESSAGES.hash_of(kind.__idl_typename__) == rihs01(kind)
 
 
-def test_type_hash_of_humble_is_not_supported():
+def test_type_hash_of_string_matches_the_design_page_and_humble_has_none():
+    assert MESSAGES.hash_of("std_msgs/msg/String").startswith("RIHS01_df668c740482bbd48fb39d76a70dfd4b")
     assert Messages("humble").hash_of(keys.TWIST) == "TypeHashNotSupported"
 
 
-def test_type_hash_of_string_matches_the_design_page():
-    assert Messages("jazzy").hash_of("std_msgs/msg/String").startswith("RIHS01_df668c740482bbd48fb39d76a70dfd4b")
-
-
 def test_rmw_keys_have_domain_name_type_and_hash():
-    key = rmw_key(0, "/cmd_vel", keys.TWIST, HASHES[keys.TWIST])
+    key = keys.rmw_key(0, "/cmd_vel", keys.TWIST, HASHES[keys.TWIST])
     assert key == f"0/cmd_vel/geometry_msgs::msg::dds_::Twist_/{HASHES[keys.TWIST]}"
-    assert zenoh.KeyExpr(rmw_key(0, "/cmd_vel", keys.TWIST)).includes(zenoh.KeyExpr(key))
-    assert not zenoh.KeyExpr(rmw_key(0, "/cmd_vel", keys.TWIST_STAMPED)).includes(zenoh.KeyExpr(key))
+    assert zenoh.KeyExpr(keys.rmw_key(0, "/cmd_vel", keys.TWIST)).includes(zenoh.KeyExpr(key))
+    assert not zenoh.KeyExpr(keys.rmw_key(0, "/cmd_vel", keys.TWIST_STAMPED)).includes(zenoh.KeyExpr(key))
 
 
 def test_bridge_keys_are_topic_names():
-    assert bridge_key(absolute("bot1", "cmd_vel")) == "bot1/cmd_vel"
-    assert bridge_key(absolute("/", "cmd_vel")) == "cmd_vel"
+    assert keys.bridge_key(keys.absolute("bot1", "cmd_vel")) == "bot1/cmd_vel"
+    assert keys.bridge_key(keys.absolute("/", "cmd_vel")) == "cmd_vel"
 
 
 def test_rmw_tokens_match_the_design_page():
-    node = RmwNode(2, "aa11", 1, "/flock_0", "base")
+    node = keys.RmwNode(2, "aa11", 1, "/flock_0", "base")
     assert node.token == "@ros2_lv/2/aa11/10000/10000/NN/%/%flock_0/base"
     assert node.topic_token(3, "MP", "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64") == (
         "@ros2_lv/2/aa11/10000/10003/MP/%/%flock_0/base/%flock_0%scan/"
         "sensor_msgs::msg::dds_::LaserScan_/RIHS01_64/::,10:,:,:,,"
     )
-    assert RmwNode(0, "aa11", 0, "/", "base").token == "@ros2_lv/0/aa11/0/0/NN/%/%/base"
+    assert keys.RmwNode(0, "aa11", 0, "/", "base").token == "@ros2_lv/0/aa11/0/0/NN/%/%/base"
     for token in (node.token, node.topic_token(3, "MP", "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64")):
         assert zenoh.KeyExpr("@ros2_lv/2/**").includes(zenoh.KeyExpr(token))
 
@@ -105,56 +85,58 @@ def test_rmw_tokens_match_the_design_page():
 @pytest.mark.parametrize(
     ("qos", "in_rmw", "in_bridge"),
     [
-        (Qos(), "//::,10:,:,:,,", "/:1:0:0,10:"),
-        (Qos(depth=100), "//::,100:,:,:,,", "/:1:0:0,100:"),
-        (Qos(depth=42), "//::,:,:,:,,", "/:1:0:0,42:"),  # rmw_zenoh leaves out its own defaults
-        (Qos(depth=1, latched=True), "//:1:,1:,:,:,,", "/:1:1:0,1:"),
+        (keys.Qos(), "//::,10:,:,:,,", "/:1:0:0,10:"),
+        (keys.Qos(depth=100), "//::,100:,:,:,,", "/:1:0:0,100:"),
+        (keys.Qos(depth=42), "//::,:,:,:,,", "/:1:0:0,42:"),  # rmw_zenoh leaves out its own defaults
+        (keys.Qos(depth=1, latched=True), "//:1:,1:,:,:,,", "/:1:1:0,1:"),
     ],
 )
 def test_tokens_carry_depth_and_durability(qos, in_rmw, in_bridge):
     topic = "/flock_0/tf_static", keys.TRANSFORMS, ""
-    assert RmwNode(0, "aa11", 0, "/flock_0", "base").topic_token(1, "MP", *topic, qos).endswith(in_rmw)
-    assert in_bridge in bridge_token("aa11", WRITE, *topic, qos)
+    assert keys.RmwNode(0, "aa11", 0, "/flock_0", "base").topic_token(1, "MP", *topic, qos).endswith(in_rmw)
+    assert in_bridge in keys.bridge_token("aa11", keys.WRITE, *topic, qos)
 
 
 def test_publisher_id_is_the_xxh3_of_its_token():
     """xxHash's own test vector of no bytes, as XXH3_128bits returns its halves."""
-    assert publisher_id("") == struct.pack("<QQ", 0x6001C324468D497F, 0x99AA06D3014798D8)
+    assert keys.publisher_id("") == struct.pack("<QQ", 0x6001C324468D497F, 0x99AA06D3014798D8)
 
 
 def test_bridge_tokens_match_its_source():
-    token = bridge_token("aa11", WRITE, "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64")
-    assert bridge_token("aa11", READ, "/flock_0/cmd_vel", keys.TWIST, "").startswith("@/aa11/@ros2_lv/MS/")
+    token = keys.bridge_token("aa11", keys.WRITE, "/flock_0/scan", keys.LASER_SCAN, "RIHS01_64")
+    assert keys.bridge_token("aa11", keys.READ, "/flock_0/cmd_vel", keys.TWIST, "").startswith("@/aa11/@ros2_lv/MS/")
     assert token == ("@/aa11/@ros2_lv/MP/flock_0§scan/sensor_msgs§msg§LaserScan/:1:0:0,10:typehash=RIHS01_64;")
     assert zenoh.KeyExpr("@/*/@ros2_lv/**").includes(zenoh.KeyExpr(token))
-    assert zenoh.KeyExpr("@/*/@ros2_lv/**").includes(zenoh.KeyExpr(bridge_itself("aa11")))
+    assert zenoh.KeyExpr("@/*/@ros2_lv/**").includes(zenoh.KeyExpr(keys.bridge_itself("aa11")))
 
 
 @given(st.integers(0, LONGEST), st.integers(0, LONGEST), st.text(max_size=30))
 def test_attachment_matches_zenoh_serialization(sequence, utc_ns, token):
-    attached = attachment(sequence, utc_ns, publisher_id(token))
+    attached = keys.attachment(sequence, utc_ns, keys.publisher_id(token))
     assert len(attached) == 33
-    values = (Int64(sequence), Int64(utc_ns), publisher_id(token))
+    values = (Int64(sequence), Int64(utc_ns), keys.publisher_id(token))
     assert bytes(z_serialize(values)) == attached
     assert z_deserialize(tuple[Int64, Int64, bytes], zenoh.ZBytes(attached)) == values
-    check_attachment(attached)
+    keys.check_attachment(attached)
 
 
-@pytest.mark.parametrize("attached", [None, b"", bytes(33), bytes(32), attachment(1, 2, publisher_id("")) + b"0"])
+@pytest.mark.parametrize(
+    "attached", [None, b"", bytes(33), bytes(32), keys.attachment(1, 2, keys.publisher_id("")) + b"0"]
+)
 def test_message_without_a_proper_attachment_is_refused(attached):
     with pytest.raises(BadFrame, match="no_attachment"):
-        check_attachment(attached)
+        keys.check_attachment(attached)
 
 
 @given(st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,20}", fullmatch=True))
 def test_ros_name_is_valid_for_any_robot(robot):
-    assert NAME.fullmatch(ros_name(robot))
+    assert keys.NAME.fullmatch(keys.ros_name(robot))
 
 
 @pytest.mark.parametrize("name", ["", "7up", "a b", "a//b", "a/", "a__b", "flock-0", "~/scan"])
 def test_invalid_ros_name_is_refused(name):
     with pytest.raises(BadInput, match="driver: scan_topic: expected a ROS name"):
-        check_name(name, "driver", "scan_topic")
+        keys.check_name(name, "driver", "scan_topic")
 
 
 def test_missing_rosbags_names_the_pip_command(monkeypatch):

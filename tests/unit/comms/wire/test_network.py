@@ -203,21 +203,22 @@ def rules_of(access: dict[str, Any], name: str, flow: str) -> list[dict[str, Any
     return [rule for rule in access["rules"] if rule["id"] in ids and flow in rule["flows"]]
 
 
-def keys_put(access: dict[str, Any], name: str, flow: str) -> set[str]:
-    return {key for rule in rules_of(access, name, flow) if "put" in rule["messages"] for key in rule["key_exprs"]}
+def keys_of(access: dict[str, Any], name: str, flow: str, message: str = "put") -> set[str]:
+    """The keys that this name may have such messages of."""
+    return {key for rule in rules_of(access, name, flow) if message in rule["messages"] for key in rule["key_exprs"]}
 
 
 def test_access_control_lets_names_put_their_own_keys():
     access = access_control(KEYS, ROBOTS, "flock-0")
-    assert keys_put(access, "flock-1", "ingress") == {KEYS.any_radio_of("flock-1"), KEYS.bridge_sent("flock-1")}
-    assert keys_put(access, "tracker", "ingress") == {KEYS.any_pose, KEYS.bridge_received("*")}
-    assert keys_put(access, "operator", "ingress") == set()
+    assert keys_of(access, "flock-1", "ingress") == {KEYS.any_radio_of("flock-1"), KEYS.bridge_sent("flock-1")}
+    assert keys_of(access, "tracker", "ingress") == {KEYS.any_pose, KEYS.bridge_received("*")}
+    assert keys_of(access, "operator", "ingress") == set()
 
 
 @pytest.mark.parametrize("other", ["flock-1", "tracker", "operator"])
 def test_access_control_lets_a_peer_put_its_keys_to_all(other: str):
     access = access_control(KEYS, ROBOTS, "flock-0")
-    assert keys_put(access, other, "egress") == {KEYS.any_radio_of("flock-0"), KEYS.bridge_sent("flock-0")}
+    assert keys_of(access, other, "egress") == {KEYS.any_radio_of("flock-0"), KEYS.bridge_sent("flock-0")}
 
 
 def test_access_control_denies_by_default_with_one_name_per_subject():
@@ -231,7 +232,7 @@ def test_access_control_denies_by_default_with_one_name_per_subject():
 
 def test_access_control_uses_the_names_of_tracker_and_operator():
     access = access_control(KEYS, ROBOTS, "flock-0", tracker="vicon", operator="alice")
-    assert keys_put(access, "vicon", "ingress") == {KEYS.any_pose, KEYS.bridge_received("*")}
+    assert keys_of(access, "vicon", "ingress") == {KEYS.any_pose, KEYS.bridge_received("*")}
     assert not rules_of(access, "tracker", "ingress")
     assert any("query" in rule["messages"] for rule in rules_of(access, "alice", "ingress"))
 
@@ -266,32 +267,25 @@ def test_access_control_refuses_ambiguous_names(robots, name, revoked, expected)
         access_control(KEYS, robots, name, revoked=revoked)
 
 
-def keys_of(access: dict[str, Any], name: str, flow: str, message: str) -> set[str]:
-    """The keys that this name may have such messages of."""
-    ids = [rule for policy in access["policies"] if name in policy["subjects"] for rule in policy["rules"]]
-    rules = [rule for rule in access["rules"] if rule["id"] in ids and flow in rule["flows"]]
-    return {key for rule in rules if message in rule["messages"] for key in rule["key_exprs"]}
-
-
 def test_runner_access_is_limited_to_its_own_keys() -> None:
     access = agents_access(RUN_KEYS, ACCESS)
-    assert keys_of(access, "a", "ingress", "put") == {RUN_KEYS.answer("a")}
-    assert keys_of(access, "a", "egress", "put") == {RUN_KEYS.frame("a")}
+    assert keys_of(access, "a", "ingress") == {RUN_KEYS.answer("a")}
+    assert keys_of(access, "a", "egress") == {RUN_KEYS.frame("a")}
     assert keys_of(access, "a", "ingress", "query") == {RUN_KEYS.session_info("a"), RUN_KEYS.join("a")}
     assert keys_of(access, "a", "ingress", "liveliness_token") == {RUN_KEYS.alive("a")}
 
 
 def test_agents_access_of_a_router_covers_named_runners() -> None:
     access = agents_access(RUN_KEYS, ACCESS)
-    assert keys_of(access, "gate", "ingress", "put") == {RUN_KEYS.answer("a"), RUN_KEYS.answer("b")}
-    assert keys_of(access, "local", "ingress", "put") == {RUN_KEYS.answer("*")}
+    assert keys_of(access, "gate", "ingress") == {RUN_KEYS.answer("a"), RUN_KEYS.answer("b")}
+    assert keys_of(access, "local", "ingress") == {RUN_KEYS.answer("*")}
 
 
 def test_observer_access_includes_control_for_operators_only() -> None:
     access = observers_access(SEEN, ACCESS)
     for name in ("wall", "alice", "gate", "local"):
-        assert keys_of(access, name, "egress", "put") == {SEEN.truth}
-        assert keys_of(access, name, "ingress", "put") == set()
+        assert keys_of(access, name, "egress") == {SEEN.truth}
+        assert keys_of(access, name, "ingress") == set()
         controls = SEEN.control in keys_of(access, name, "ingress", "query")
         assert controls == (name != "wall")
         assert (SEEN.control in keys_of(access, name, "egress", "reply")) == controls
@@ -299,11 +293,11 @@ def test_observer_access_includes_control_for_operators_only() -> None:
 
 def test_router_access_separates_frames_from_answers() -> None:
     access = router_access(ACCESS)
-    assert keys_of(access, "world", "ingress", "put") == {ANY_RUN.frame("a"), ANY_RUN.frame("b")}
-    assert keys_of(access, "world", "egress", "put") == {ANY_RUN.answer("a"), ANY_RUN.answer("b")}
-    assert keys_of(access, "a", "ingress", "put") == {ANY_RUN.answer("a")}
-    both = keys_of(access, "world", "ingress", "put") | keys_of(access, "world", "egress", "put")
-    assert keys_of(access, "gate", "ingress", "put") == both
+    assert keys_of(access, "world", "ingress") == {ANY_RUN.frame("a"), ANY_RUN.frame("b")}
+    assert keys_of(access, "world", "egress") == {ANY_RUN.answer("a"), ANY_RUN.answer("b")}
+    assert keys_of(access, "a", "ingress") == {ANY_RUN.answer("a")}
+    both = keys_of(access, "world", "ingress") | keys_of(access, "world", "egress")
+    assert keys_of(access, "gate", "ingress") == both
 
 
 @pytest.mark.parametrize(
@@ -338,14 +332,11 @@ def test_access_refuses_wildcards_and_repeated_names(access: RunAccess, fault: s
         router_access(access)
 
 
-def test_runner_key_leads_back_to_its_runner():
+def test_key_leads_back_to_its_runner_or_run():
     keys = Keys("run-1")
     of_runner = (keys.session_info, keys.join, keys.alive, keys.frame, keys.answer)
     assert {runner_of(key("flock-3")) for key in of_runner} == {"flock-3"}
-
-
-def test_world_token_leads_back_to_its_run():
-    assert run_of(Keys("run-1").world) == "run-1"
+    assert run_of(keys.world) == "run-1"
     assert Keys("*").world == EVERY_WORLD
 
 
