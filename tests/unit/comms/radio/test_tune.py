@@ -142,14 +142,6 @@ def test_tune_changes_the_radio_graph():
     assert medium.radio == Radio(0.5)
 
 
-@pytest.mark.parametrize("loss", [0.0, 1.0])
-def test_tune_of_loss_applies_from_its_tick_on(loss: float):
-    result = tuned(replace(LOSSY, loss=loss), {10: replace(LOSSY, loss=1.0 - loss)})
-    on_air_s = result.on_air("on_air_at_ns") / 1e9
-    lost = result.on_air("fate") == 3
-    assert (lost == ((on_air_s < 1.0) == (loss == 1.0))).all()
-
-
 def test_tunable_numbers_are_those_of_a_ramp():
     radio = Radio(range_m=2.0, loss=0.3, bursts=Bursts(good_s=1.0, bad_s=0.5), send_offset=0.02)
     numbers = numbers_of(radio)
@@ -161,20 +153,11 @@ def test_tunable_numbers_are_those_of_a_ramp():
         assert number_of(radio, f"radio.{key}") == value
 
 
-def test_antennas_default_to_the_radio():
+def test_antennas_of_groups_have_their_own_power_or_gain_or_the_radios():
     alike = Antennas.alike(2)
-    assert alike.send_dbm(RADIO).tolist() == [12.0, 12.0]
-    assert alike.receive_dbi(RADIO).tolist() == [2.0, 2.0]
-
-
-def test_antennas_of_groups_have_their_own_power_or_gain():
-    groups = [
-        (1, RobotAntenna(power_dbm=0.0)),
-        (2, RobotAntenna(gain_dbi=-1.0)),
-        (1, None),
-        (1, RobotAntenna(1.0, 1.0)),
-    ]
-    mixed = Antennas.of_groups(groups)
+    assert (alike.send_dbm(RADIO).tolist(), alike.receive_dbi(RADIO).tolist()) == ([12.0, 12.0], [2.0, 2.0])
+    own = RobotAntenna(power_dbm=0.0), RobotAntenna(gain_dbi=-1.0), RobotAntenna(1.0, 1.0)
+    mixed = Antennas.of_groups([(1, own[0]), (2, own[1]), (1, None), (1, own[2])])
     assert mixed.send_dbm(RADIO).tolist() == [2.0, 9.0, 9.0, 12.0, 2.0]
     assert mixed.receive_dbi(RADIO).tolist() == [2.0, -1.0, -1.0, 2.0, 1.0]
 
@@ -207,11 +190,14 @@ def test_tune_to_equal_parameters_changes_nothing(method: str):
     plain = ran(make_medium(radio, 8), FEW, everybody(8), {})
     assert links(ran(make_medium(radio, 8), FEW, everybody(8), same)) == links(plain)
     gains: dict[int, Change] = {3: gained(1.0), 4: gained(0.0)}
-    apart = ran(
-        make_medium(radio, 8), FEW, lambda tick: everybody(8)(0) if tick not in (2, 3, 4) else SentPackets.none(), gains
-    )
-    silent = ran(
-        make_medium(radio, 8), FEW, lambda tick: everybody(8)(0) if tick not in (2, 3, 4) else SentPackets.none(), {}
+    apart, silent = (
+        ran(
+            make_medium(radio, 8),
+            FEW,
+            lambda tick: SentPackets.none() if tick in (2, 3, 4) else everybody(8)(0),
+            changes,
+        )
+        for changes in (gains, {})
     )
     assert links(apart) == links(silent)
 
@@ -227,22 +213,14 @@ def test_tune_of_a_phy_applies_to_packets_after_the_change_only(method: str):
     np.testing.assert_array_equal(changed.edges, alone.edges)
 
 
-def test_tune_of_noise_applies_within_a_frame():
+@pytest.mark.parametrize(("at_tick", "received"), [(1, 0), (7, 1)])
+def test_tune_of_noise_applies_within_a_frame(at_tick: int, received: int):
     """It takes 0.5 s, and the noise rises beyond hope when a tenth, or nine tenths, of it is over."""
     slow = replace(with_access("aloha"), bit_rate_bps=900, max_payload_bytes=60)
-    loud = replace(slow, noise=ReceiverNoise(5e6, 30.0))
-
-    def received(at_tick: int) -> int:
-        result = ran(
-            make_medium(slow, 2),
-            at((0, 0), (50, 0)),
-            lambda tick: packets([0] * (tick == 0), size=40),
-            {at_tick: another(loud)},
-        )
-        return result.fates().get("RECEIVED", 0)
-
-    assert received(1) == 0
-    assert received(7) == 1
+    change = another(replace(slow, noise=ReceiverNoise(5e6, 30.0)))
+    medium, pose = make_medium(slow, 2), at((0, 0), (50, 0))
+    result = ran(medium, pose, lambda tick: packets([0] * (tick == 0), size=40), {at_tick: change})
+    assert result.fates().get("RECEIVED", 0) == received
 
 
 def test_gain_of_sender_equals_power_and_of_receiver_an_antenna():
@@ -256,14 +234,11 @@ def test_gain_of_sender_equals_power_and_of_receiver_an_antenna():
 
 def test_gain_of_a_deaf_antenna_still_sends_but_has_no_edge():
     deaf = gained(receive_db=np.array([-60.0, 0.0]))
-    result = ran(make_medium(with_access("none"), 2), at((0, 0), (50, 0)), lambda _: packets([0, 1]), {0: deaf}, 6)
-    assert set(result.received("receiver").tolist()) == {1}
-    assert not len(result.edges)
-    back = ran(
-        make_medium(with_access("none"), 2), at((0, 0), (50, 0)), lambda _: packets([0, 1]), {0: deaf, 3: gained()}, 6
-    )
-    assert set(back.received("receiver").tolist()) == {0, 1}
-    assert back.edges.tolist() == [[0, 1]]
+    for changes, receivers, edges in (({0: deaf}, {1}, []), ({0: deaf, 3: gained()}, {0, 1}, [[0, 1]])):
+        medium = make_medium(with_access("none"), 2)
+        result = ran(medium, at((0, 0), (50, 0)), lambda _: packets([0, 1]), changes, 6)
+        assert set(result.received("receiver").tolist()) == receivers
+        assert result.edges.tolist() == edges
 
 
 def test_gain_can_exceed_the_former_range():
@@ -332,28 +307,22 @@ def test_backlog_of_newest_replaces_the_waiting_packet(method: str):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_backlog_of_addressed_packets_is_received_once(method: str):
-    def sent(tick: int) -> SentPackets:
-        return packets([0] * 2 * (tick < 4), 1)
-
-    result = ran(make_medium(with_access(method), 2), PHY_PAIR, sent, {1: switched(ALL, 0), 6: switched(ALL)})
-    assert result.fates() == {"RECEIVED": 8}
-    stricter = ran(
-        make_medium(with_access(method), 2),
-        PHY_PAIR,
-        sent,
-        {1: switched(ALL, 0), 4: switched(NEWEST, 0), 6: switched(DROP)},
-    )
-    assert stricter.fates() == {"RECEIVED": 3, "BLACKOUT": 5}
+    for changes, fates in (
+        ({1: switched(ALL, 0), 6: switched(ALL)}, {"RECEIVED": 8}),
+        ({1: switched(ALL, 0), 4: switched(NEWEST, 0), 6: switched(DROP)}, {"RECEIVED": 3, "BLACKOUT": 5}),
+    ):
+        medium = make_medium(with_access(method), 2)
+        assert ran(medium, PHY_PAIR, lambda tick: packets([0] * 2 * (tick < 4), 1), changes).fates() == fates
 
 
 def test_partition_one_way_removes_the_edge():
     def apart(held: Disruption) -> None:
         held.one_way = np.array([[1, 2]])
 
-    result = ran(make_medium(with_access("aloha"), 2), PHY_PAIR, lambda _: packets([0]), {0: apart}, 4)
-    assert result.fates() == {"PARTITIONED": 4}
-    assert not len(result.edges)
-    assert (
-        ran(make_medium(with_access("aloha"), 2), PHY_PAIR, lambda _: packets([1]), {0: apart}, 4).fates()["RECEIVED"]
-        >= 3
+    there, back = (
+        ran(make_medium(with_access("aloha"), 2), PHY_PAIR, lambda _, sender=sender: packets([sender]), {0: apart}, 4)
+        for sender in (0, 1)
     )
+    assert there.fates() == {"PARTITIONED": 4}
+    assert not len(there.edges)
+    assert back.fates()["RECEIVED"] >= 3

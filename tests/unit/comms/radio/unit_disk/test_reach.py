@@ -71,16 +71,9 @@ def test_range_and_bearing_are_exact_without_noise():
     """Robot 1 looks along +y: robot 0, at its west, is at its left; robot 2, at its south, behind it."""
     radio = Radio(9.0, send_offset="tick", measures=MEASURES)
     result = run(make_medium(radio, 3), at((-2, 0, 0), (0, 0, np.pi / 2), (0, -1, 0)), lambda _: packets([0, 2]), 1)
-    seen = {
-        (int(r), int(s)): (range_m, bearing_rad)
-        for r, s, range_m, bearing_rad in zip(
-            result.received("receiver"),
-            result.received("sender_index"),
-            result.measured("range_m"),
-            result.measured("bearing_rad"),
-            strict=True,
-        )
-    }
+    links = result.rows("received", "receiver", "sender_index")
+    measured = zip(result.measured("range_m"), result.measured("bearing_rad"), strict=True)
+    seen = dict(zip(links, measured, strict=True))
     assert seen[1, 0] == (2.0, np.pi / 2)
     assert seen[1, 2] == (1.0, np.pi)
     assert seen[0, 2] == pytest.approx((5**0.5, np.arctan2(-1, 2)))
@@ -236,9 +229,7 @@ def depth(obstacle: Obstacle, points: FloatArray) -> float:
 
 def test_torus_offset_is_the_nearest_image() -> None:
     assert to_nearest(5.9, 0.0) == 0.0
-    assert [5.9 + to_nearest(5.9, 6.0), -3.5 + to_nearest(-3.5, 6.0), 2.0 + to_nearest(2.0, 6.0)] == pytest.approx(
-        [-0.1, 2.5, 2.0]
-    )
+    assert [x_m + to_nearest(x_m, 6.0) for x_m in (5.9, -3.5, 2.0)] == pytest.approx([-0.1, 2.5, 2.0])
 
 
 @pytest.mark.parametrize("radio", [Radio(model="friis"), Radio(range_m=1.0, bodies_block=True)])
