@@ -24,6 +24,7 @@ from tests.support.comms.radio import (
     RADIOS,
     RATE_HZ,
     TICK_NS,
+    Run,
     drawing,
     everybody,
     make_medium,
@@ -209,20 +210,16 @@ def received(radio: Radio, seed: int, between: Sequence[float] = ()) -> IntArray
 
     `between` are moments, as shares of a tick, at which the medium is asked, too.
     """
-    rng = np.random.default_rng(seed)
-    medium = make_medium(radio, FIVE, range(ARENAS))
-    pose = scattered(ARENAS * FIVE, seed)
-    received_packets = []
+    rng, pose = np.random.default_rng(seed), scattered(ARENAS * FIVE, seed)
+    result = Run(make_medium(radio, FIVE, range(ARENAS)))
     for tick in range(LATE_TICKS + 40):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        received_packets.append(medium.step(at_ns, pose).received)
+        result.news.append(result.medium.step(at_ns, pose))
         if tick < LATE_TICKS:
-            medium.send(at_ns, tick, random_traffic(rng, ARENAS, FIVE))
+            result.medium.send(at_ns, tick, random_traffic(rng, ARENAS, FIVE))
         for share in between:
-            medium.advance(at_ns + int(share * TICK_NS))
-    return np.concatenate(
-        [np.stack([h.receiver, h.sender_index, h.sequence, h.received_at_ns], axis=1) for h in received_packets]
-    )
+            result.medium.advance(at_ns + int(share * TICK_NS))
+    return np.array(result.rows("received", "receiver", "sender_index", "sequence", "received_at_ns"))
 
 
 def sorted_rows(rows: IntArray) -> Any:
@@ -267,26 +264,15 @@ def test_reception_ended_by_a_disruption_delays_no_other():
     radio = Radio(9.0, send_offset="tick", delays=Delays("uniform", 0.5, 0.28))
     times: list[dict[tuple[int, int], int]] = []
     for variant in (radio, in_order(radio)):
-        medium, pose = make_medium(variant, 12), scattered(12)
-        times.append({})
+        result, pose = Run(make_medium(variant, 12)), scattered(12)
         for tick in range(14):
             now = Disruption.none(12)
             now.radio_on[0] = tick != 1
-            at_ns = tick_start_ns(tick, RATE_HZ)
-            received_packets = medium.step(at_ns, pose, now).received
-            times[-1] |= {
-                (s, q): t
-                for r, s, q, t in zip(
-                    received_packets.receiver,
-                    received_packets.sender_index,
-                    received_packets.sequence,
-                    received_packets.received_at_ns,
-                    strict=True,
-                )
-                if r == 0
-            }
+            result.news.append(result.medium.step(tick_start_ns(tick, RATE_HZ), pose, now))
             if tick in (0, 2):
-                medium.send(at_ns, tick, packets(range(1, 12)))
+                result.medium.send(tick_start_ns(tick, RATE_HZ), tick, packets(range(1, 12)))
+        rows = result.rows("received", "receiver", "sender_index", "sequence", "received_at_ns")
+        times.append({(sender, sequence): at_ns for to, sender, sequence, at_ns in rows if to == 0})
     free, ordered = times
     ended = [sender for sender in range(1, 12) if (sender, 0) not in free]
     assert len(ended) > 5

@@ -11,12 +11,12 @@ from scipy import integrate, stats
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import derive_key, uniform
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.ethernet import exchanged, station
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays, refuse_negative
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Interface, Radio
 from swarmwire.comms.radio.phy.packets import frames_of
+from swarmwire.comms.radio.records import ReceptionRecords
 from swarmwire.comms.radio.send_times import SendTimes
 from swarmwire.comms.radio.stages.delays import MAX_NS, delay_distribution, varying_delay_ns
 from swarmwire.comms.radio.timing import (
@@ -34,6 +34,7 @@ from swarmwire.comms.radio.timing import (
 )
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 from tests.support.comms.radio import TICK_NS, at, everybody, make_medium, packets, run, scattered, with_access
+from tests.support.refusals import refused_input
 
 PAIR = at((0, 0), (1, 0))
 AIRTIME_NS = 320_000  # 10 bytes at 250 kbit/s
@@ -70,19 +71,6 @@ def test_advance_within_a_tick_receives_a_packet_once(early_ns: int, received: l
     assert [len(medium.advance(AIRTIME_NS + late_ns)[0]) for late_ns in (-early_ns, 10)] == received
 
 
-def test_send_phase_spans_the_tick_and_jitter_a_fifth_of_it():
-    result = run(make_medium(Radio(99.0), 40), np.zeros((40, 3)), everybody(40), 20, 3)
-    offset_ns = np.full((40, 20), -1)
-    sender, sequence = result.finished("sender"), result.finished("sequence")
-    offset_ns[sender, sequence] = result.finished("sent_at_ns") - sequence * TICK_NS
-    spread_ns = np.ptp(offset_ns, axis=1)
-    assert (spread_ns < TICK_NS // 5).all()
-    assert spread_ns.max() > 0.17 * TICK_NS
-    assert offset_ns.min() >= 0
-    assert offset_ns.max() < 1.2 * TICK_NS
-    assert np.histogram(offset_ns[:, 0], 4, (0, 1.1 * TICK_NS))[0].min() > 0
-
-
 def test_send_phase_of_a_slow_robot_spans_its_own_period():
     """Of 200 robots with a period of 4 ticks all are in the same quarter of it by chance in none of 10^100 seeds."""
     every, keys = np.where(np.arange(400) % 2, 4, 1), np.array([1], np.uint64)
@@ -95,10 +83,16 @@ def test_send_phase_of_a_slow_robot_spans_its_own_period():
     assert np.array_equal(fast[3], (alone.in_tick(12 * TICK_NS, 12) - 12 * TICK_NS)[::2])
 
 
-@pytest.mark.parametrize("send_offset", ["phase", -0.1, float("nan")])
-def test_send_offset_of_another_kind_is_refused(send_offset: str | float):
-    with pytest.raises(ValueError, match="send_offset: expected"):
-        make_medium(Radio(9.0, send_offset=send_offset), 2)
+@pytest.mark.parametrize(
+    ("radio", "key"),
+    [
+        *((Radio(9.0, send_offset=offset), "send_offset") for offset in ("phase", -0.1, float("nan"))),
+        (Radio(None), "range_m"),
+    ],
+)
+def test_radio_without_a_send_offset_or_range_is_refused(radio: Radio, key: str):
+    with pytest.raises(ValueError, match=f"{key}: expected"):
+        make_medium(radio, 2)
 
 
 def test_geometry_is_that_of_the_tick_on_air():
@@ -128,11 +122,6 @@ def test_empty_send_takes_no_sequence_number():
     medium.send_at(np.zeros(0, np.int64), packets([]))  # long ago: packets would be refused
     with pytest.raises(ValueError):
         medium.send_at(np.zeros(1, np.int64), packets([0]))
-
-
-def test_unit_disk_without_a_range_is_refused():
-    with pytest.raises(ValueError, match="range_m: expected a range, as a unit disk has one"):
-        make_medium(Radio(None), 2)
 
 
 @pytest.mark.parametrize(
@@ -295,24 +284,15 @@ def test_delays_of_the_last_draw_are_finite_integers(distribution: str, mean_s: 
 
 
 def test_uniform_delay_that_would_be_negative_is_refused():
-    with pytest.raises(BadInput, match=r"a.toml: radio.delay.deviation_s: expected at most 0.0057735 s"):
+    with refused_input("a.toml", "radio.delay.deviation_s"):
         law_of("uniform", 0.01, 0.006)
     assert varying_delay_ns(law_of("uniform", 0.01, 0.005), 0.5) == pytest.approx(0.01 * NS_PER_S, abs=1)
 
 
-def frame_of(packet_bytes: int) -> Payloads:
-    """A frame with an IP packet of so many bytes."""
-    return Payloads.from_row(exchanged(station(1) + station(0) + b"\x08\x00" + bytes(packet_bytes)))
-
-
-@pytest.mark.parametrize("model", ["unit-disk", "log-distance"])
-@pytest.mark.parametrize(("frame", "headers"), [("802.11a", 24 + 8 + 4), ("plain", 14)])
-@pytest.mark.parametrize("packet_bytes", [28, 500, 1500])
-def test_interface_frame_takes_the_airtime_of_its_standard(model, frame, headers, packet_bytes):
-    """802.11: MAC header, LLC with SNAP, FCS (IEEE 802.11-2007, 7.1.3); other radios carry the Ethernet header."""
+def interface_radio(frame: str, model: str) -> Radio:
+    """A radio with a network interface that carries IP packets of up to 1500 bytes."""
     overhead, most = (64, 1472) if frame == "802.11a" else (0, 1514)
-    access = None if model == "unit-disk" else Access("none")
-    radio = Radio(
+    return Radio(
         range_m=5.0,
         model=model,
         frame=frame,
@@ -320,32 +300,33 @@ def test_interface_frame_takes_the_airtime_of_its_standard(model, frame, headers
         overhead_bytes=overhead,
         max_payload_bytes=most,
         interface=Interface(),
-        access=access,
+        access=None if model == "unit-disk" else Access("none"),
     )
-    assert radio.mtu_bytes == 1500
+
+
+def finished_frames(radio: Radio, *packet_bytes: int) -> ReceptionRecords:
+    """What becomes of frames with IP packets of these sizes."""
     medium = make_medium(radio, 2)
     medium.step(0, PAIR)
-    medium.send_at(np.zeros(1, np.int64), SentPackets(np.array([0]), np.array([1]), frame_of(packet_bytes)))
-    finished = medium.step(TICK_NS, PAIR).finished
-    octets = headers + packet_bytes
+    for size in packet_bytes:
+        frame = Payloads.from_row(exchanged(station(1) + station(0) + b"\x08\x00" + bytes(size)))
+        medium.send_at(np.zeros(1, np.int64), SentPackets(np.array([0]), np.array([1]), frame))
+    return medium.step(TICK_NS, PAIR).finished
+
+
+@pytest.mark.parametrize("model", ["unit-disk", "log-distance"])
+@pytest.mark.parametrize(("frame", "headers"), [("802.11a", 24 + 8 + 4), ("plain", 14)])
+@pytest.mark.parametrize("packet_bytes", [28, 500, 1500])
+def test_interface_frame_takes_the_airtime_of_its_standard(model, frame, headers, packet_bytes):
+    """802.11: MAC header, LLC with SNAP, FCS (IEEE 802.11-2007, 7.1.3); other radios carry the Ethernet header."""
+    finished = finished_frames(interface_radio(frame, model), packet_bytes)
     airtime = ieee80211a_ns if frame == "802.11a" else at_bit_rate_ns
-    assert finished.final_at_ns[0] - finished.on_air_at_ns[0] == airtime(octets, 6_000_000)
+    assert finished.final_at_ns[0] - finished.on_air_at_ns[0] == airtime(headers + packet_bytes, 6_000_000)
     assert finished.size_bytes[0] == 14 + packet_bytes
 
 
 @pytest.mark.parametrize("frame", ["802.11a", "plain"])
 def test_interface_frame_above_the_mtu_is_too_large(frame):
-    overhead, most = (64, 1472) if frame == "802.11a" else (0, 1514)
-    radio = Radio(
-        range_m=5.0,
-        frame=frame,
-        bit_rate_bps=6_000_000,
-        overhead_bytes=overhead,
-        max_payload_bytes=most,
-        interface=Interface(),
-    )
-    medium = make_medium(radio, 2)
-    medium.step(0, PAIR)
-    for packet_bytes in (radio.mtu_bytes, radio.mtu_bytes + 1):
-        medium.send_at(np.zeros(1, np.int64), SentPackets(np.array([0]), np.array([1]), frame_of(packet_bytes)))
-    assert sorted(medium.step(TICK_NS, PAIR).finished.fate.tolist()) == [Fate.RECEIVED, Fate.TOO_LARGE]
+    radio = interface_radio(frame, "unit-disk")
+    assert radio.mtu_bytes == 1500
+    assert sorted(finished_frames(radio, 1500, 1501).fate.tolist()) == [Fate.RECEIVED, Fate.TOO_LARGE]

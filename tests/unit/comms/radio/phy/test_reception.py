@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT
-from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
+from swarmwire.comms.radio.config.impairments import Measures, RangeMeasure
 from swarmwire.comms.radio.config.phy import Access, Antenna, Fading, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption, Jammers
@@ -197,14 +197,6 @@ def test_radio_graph_joins_robots_that_a_lone_packet_reaches():
     pose = at((0, 0), (90, 0), (230, 0))
     assert medium.step(0, pose).edges.tolist() == [[0, 1]]
     assert medium.step(1, pose, living([True, False, True])).edges.tolist() == []
-
-
-def test_burst_share_is_equal_for_disk_and_phy():
-    """Bursts last as long whatever carries them: within 0.05 of the share of bad time."""
-    for radio in (Radio(9.0, send_offset="tick"), with_access("none")):
-        bursty = replace(radio, bursts=Bursts(0.1, 0.3))
-        result = run(make_medium(bursty, 20), scattered(20), everybody(20), 20, 1)
-        assert result.tally.fates[0, Fate.BURST] / result.tally.in_range[0] == pytest.approx(0.25, abs=0.05)
 
 
 @given(signal_radios(), st.integers(2, 8), st.integers(0, 1000))
