@@ -104,8 +104,7 @@ def test_policy_outside_its_training_is_refused_in_one_line(tmp_path: Path, body
 
 
 def test_malformed_policy_files_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "flock.onnx"
-    plain = network(SIZES)
+    path, plain = tmp_path / "flock.onnx", network(SIZES)
     layout = PolicyLayout(FLOCKING, load_body("epuck"))
 
     def described(about: object) -> bytes:
@@ -113,18 +112,15 @@ def test_malformed_policy_files_are_refused(tmp_path: Path) -> None:
         helper.set_model_props(model, {METADATA: about if isinstance(about, str) else json.dumps(about)})
         return model.SerializeToString()
 
+    about = {"format": 1, "io": {}, "observation": ["one"], "action": ["two", "three"]}
     cases = {
         "onnxruntime does not load it": b"no model",
         "has no description of its observations": plain,
         "expected JSON": described("{"),
         "format: expected 1, got 2": described({"format": 2}),
         "io: is missing": described({"format": 1}),
-        "neighbours: expected 0 to 64, got 65": described(
-            {"format": 1, "io": {"neighbours": 65}, "observation": [], "action": []}
-        ),
-        r"expected a network of 1 numbers to 2, got \(7, 3\)": described(
-            {"format": 1, "io": {}, "observation": ["one"], "action": ["two", "three"]}
-        ),
+        "neighbours: expected 0 to 64, got 65": described({**about, "io": {"neighbours": 65}}),
+        r"expected a network of 1 numbers to 2, got \(7, 3\)": described(about),
     }
     for fault, data in cases.items():
         path.write_bytes(data)

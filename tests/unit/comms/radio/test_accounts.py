@@ -41,7 +41,7 @@ from tests.support.comms.radio import (
     with_access,
 )
 
-BOTH, FIRST, NONE = np.array([True, True]), np.array([True, False]), np.zeros(0, np.int64)
+BOTH, FIRST = np.array([True, True]), np.array([True, False])
 ROBOTS = 3
 POSE = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
 PAYLOADS = [b"\x01\x02 of arena 0", b"\x03\x04 of arena 1, longer"]
@@ -200,26 +200,17 @@ def test_departure_has_receivers_and_airtime():
     ]
 
 
-def test_dead_robots_are_intended_by_packets_sent_before_death() -> None:
+def test_dead_robots_are_intended_by_packets_sent_before_death_until_none_waits() -> None:
     lives = LivenessHistory(2)
-    lives.record(BOTH)
-    assert (lives.epoch, lives.any_dead) == (0, False)
-    lives.record(FIRST)
-    assert (lives.epoch, lives.any_dead) == (1, True)
-    assert lives.intended(np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])).tolist() == [True, True, True, False]
-
-
-def test_death_is_forgotten_when_all_live_and_no_packet_waits() -> None:
-    lives = LivenessHistory(2)
-    for alive in (FIRST, BOTH):
+    for alive, epoch in ((BOTH, 0), (FIRST, 1)):
         lives.record(alive)
-    lives.drop_unused(queued=np.array([1, 2]))
-    assert lives.any_dead
-    lives.drop_unused(queued=np.array([2]))
-    assert not lives.any_dead
+        assert (lives.epoch, lives.any_dead) == (epoch, alive is FIRST)
+    assert lives.intended(np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])).tolist() == [True, True, True, False]
+    lives.record(BOTH)
+    for queued, any_dead in (([1, 2], True), ([2], False), ([], False)):
+        lives.drop_unused(queued=np.array(queued, np.int64))
+        assert lives.any_dead == any_dead
     assert lives.intended(np.array([2, 2]), np.array([0, 1])).all()
-    lives.drop_unused(queued=NONE)
-    assert not lives.any_dead
 
 
 def sent(radio: str) -> RadioMedium:
