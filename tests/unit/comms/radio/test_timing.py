@@ -39,7 +39,6 @@ from tests.support.refusals import refused_input
 PAIR = at((0, 0), (1, 0))
 AIRTIME_NS = 320_000  # 10 bytes at 250 kbit/s
 OCTETS = st.integers(0, 2304)
-# Keys are fixed; Kolmogorov-Smirnov tests have a false-alarm rate of 1 in 1000.
 DRAWS = uniform(derive_key("delays"), np.arange(20_000), 0, 0, 0)
 LAST_DRAW = 1.0 - 2.0**-53
 UNITS = st.floats(0.0, LAST_DRAW)
@@ -238,12 +237,6 @@ def test_delays_are_quantiles_of_their_distribution(distribution: str, mean_s: f
     for u in (1e-9, 0.001, 0.1, 0.5, 0.9, 0.999, 1.0 - 1e-9):
         # Rounded down to whole ns; scipy's truncated normal has ten digits or so.
         assert varying_delay_ns(law, u) == pytest.approx(expected.ppf(u) * NS_PER_S, rel=1e-9, abs=1.01)
-
-
-@pytest.mark.parametrize("distribution", DISTRIBUTIONS)
-def test_delays_of_many_draws_have_their_distribution(distribution: str):
-    delays_s = np.array([varying_delay_ns(law_of(distribution), u) for u in DRAWS]) / NS_PER_S
-    assert stats.kstest(delays_s, reference(distribution, 0.02, 0.008).cdf).pvalue > 1e-3
 
 
 @pytest.mark.parametrize(("distribution", "tolerance"), [("uniform", 1e-6), ("lognormal", 1e-5), ("pareto", 1e-3)])

@@ -188,9 +188,8 @@ def test_actions_frame_survives_encoding(payloads: list[bytes], data: st.DataObj
     sender = np.array(data.draw(st.lists(st.sampled_from(ROWS.tolist()), min_size=k, max_size=k)), np.int64)
     to = np.array(data.draw(st.lists(st.integers(BROADCAST, I64.max), min_size=k, max_size=k)), np.int64)
     drive = data.draw(npst.arrays(np.bool_, 3))
-    ids = np.where(
-        to == BROADCAST, NO_TX_STATUS, data.draw(npst.arrays(np.int64, k, elements=st.integers(NO_TX_STATUS, I64.max)))
-    )
+    drawn_ids = data.draw(npst.arrays(np.int64, k, elements=st.integers(NO_TX_STATUS, I64.max)))
+    ids = np.where(to == BROADCAST, NO_TX_STATUS, drawn_ids)
     sent = SentPackets(sender, to, Payloads.from_rows(payloads), data.draw(st.sampled_from([None, ids])))
     actions = Actions(ROWS, drive, *(data.draw(floats(3)) for _ in range(3)), sent)
     frame = frames.decode(encode_actions(8, actions))
@@ -296,15 +295,13 @@ def test_actions_frame_of_empty_sent_tables_has_no_packets() -> None:
 
 
 def noting(rows: list[int], code: list[float], names: tuple[Any, ...]) -> bytes:
-    return encode_actions(
-        0, sound(notes=SparseTable(np.array(rows), np.zeros_like(rows), np.array(code, float), names))
-    )
+    notes = SparseTable(np.array(rows), np.zeros_like(rows), np.array(code, float), names)
+    return encode_actions(0, sound(notes=notes))
 
 
 def numbering(rows: list[int], value: list[float]) -> bytes:
-    return encode_actions(
-        0, sound(values=SparseTable(np.array(rows, np.int64), np.zeros(len(rows), np.int64), np.array(value)))
-    )
+    values = SparseTable(np.array(rows, np.int64), np.zeros(len(rows), np.int64), np.array(value))
+    return encode_actions(0, sound(values=values))
 
 
 def test_actions_frame_survives_with_states_and_values() -> None:

@@ -80,9 +80,8 @@ def test_jammer_too_weak_to_matter_changes_nothing():
     radio = replace(with_access("csma-802154"), send_offset="uniform", shadowing=Shadowing())
     pose = scattered(12) * [20.0, 20.0, 1.0]
     weak = jammers({"power_dbm": -100.0, "x_m": 500.0, "on_ns": 10**6, "period_ns": 3 * 10**6})
-    assert received(ran(make_medium(radio, 12), pose, everybody(12)(0), weak)) == received(
-        ran(make_medium(radio, 12), pose, everybody(12)(0), Jammers.none())
-    )
+    jammed, clear = (ran(make_medium(radio, 12), pose, everybody(12)(0), now) for now in (weak, Jammers.none()))
+    assert received(jammed) == received(clear)
 
 
 def test_jammer_drowns_exactly_the_frames_that_overlap():
@@ -138,26 +137,24 @@ def test_jammer_blocks_carrier_sense():
 
 def test_jammer_carried_by_a_robot_spares_it_and_drowns_neighbours():
     radio = replace(with_access("aloha"), send_offset="uniform")
-    pose = at((0, 0), (3, 0), (2000, 0), (2003, 0))
+    pose, sent = at((0, 0), (3, 0), (2000, 0), (2003, 0)), packets([0, 1, 2, 3])
+    alone = received(ran(make_medium(radio, 4), pose, sent, Jammers.none()))
     for carrier, spared in ((0, {0, 2, 3}), (2, {0, 1, 2})):
-        result = ran(make_medium(radio, 4), pose, packets([0, 1, 2, 3]), jammers({"carrier": carrier}))
-        alone = ran(make_medium(radio, 4), pose, packets([0, 1, 2, 3]), Jammers.none())
+        result = ran(make_medium(radio, 4), pose, sent, jammers({"carrier": carrier}))
         assert {receiver for receiver, _, _ in received(result)} <= spared
         assert result.fates()["JAMMED"] > 0
-        assert {row for row in received(result) if row[0] == carrier} == {
-            row for row in received(alone) if row[0] == carrier
-        }
+        assert {row for row in received(result) if row[0] == carrier} == {row for row in alone if row[0] == carrier}
 
 
 @pytest.mark.parametrize("change", [{"walls": Walls(60.0)}, {"line_of_sight": True}])
 def test_jammer_is_blocked_by_walls_and_obstacles(change: dict[str, Any]):
-    radio, pose = with_access("aloha"), at((0, 0), (1, 0))
-    wall = [Obstacle("box", 1.5, 0.0, size_m=(0.2, 4.0))]
-    beyond = jammers({"x_m": 2.0})
-    assert "RECEIVED" not in ran(make_medium(radio, 2, obstacles=[wall]), pose, packets([0]), beyond).fates()
-    assert ran(make_medium(replace(radio, **change), 2, obstacles=[wall]), pose, packets([0]), beyond).fates() == {
-        "RECEIVED": 20
-    }
+    radio, wall = with_access("aloha"), [Obstacle("box", 1.5, 0.0, size_m=(0.2, 4.0))]
+    bare, blocked = (
+        ran(make_medium(radio_, 2, obstacles=[wall]), at((0, 0), (1, 0)), packets([0]), jammers({"x_m": 2.0})).fates()
+        for radio_ in (radio, replace(radio, **change))
+    )
+    assert "RECEIVED" not in bare
+    assert blocked == {"RECEIVED": 20}
 
 
 @pytest.mark.parametrize(("on_ms", "joined"), [(50, True), (95, False), (100, False)])
