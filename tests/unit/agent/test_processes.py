@@ -44,12 +44,15 @@ AGENTS = ("Chatter", "Counter", "Insisting", "VectorInsisting", "VectorCounter")
 
 def everything(actions: Actions) -> list[Any]:
     """Actions as plain values, with their tables and the ids of transmit statuses."""
-    order = np.argsort(actions.sent.sender, kind="stable")
-    notes = {
-        (row, actions.notes.names[int(at)]) for row, at in zip(actions.notes.rows, actions.notes.value, strict=True)
-    }
+    order, noted = np.argsort(actions.sent.sender, kind="stable"), actions.notes
+    notes = {(row, noted.names[int(at)]) for row, at in zip(noted.rows, noted.value, strict=True)}
     values = sorted(zip(actions.values.rows.tolist(), actions.values.value.tolist(), strict=True))
     return [plain(actions), actions.sent.tx_status_ids[order].tolist(), notes, values]
+
+
+def packets_of(sent: SentPackets) -> list[tuple[int, bytes]]:
+    """Sender and payload of each packet, sorted."""
+    return sorted(zip(sent.sender.tolist(), map(sent.payloads.row, range(len(sent))), strict=True))
 
 
 def statuses(sent: SentPackets) -> TxStatuses:
@@ -103,9 +106,7 @@ def test_packets_between_ticks_equal_those_of_one_process(
             single.receive(received, NO_TX_STATUSES)
             expected = single.on_receive(tick, 1000 * tick)
             sent = many.on_receive(tick, 1000 * tick, received, NO_TX_STATUSES)
-            assert sorted(zip(sent.sender.tolist(), map(sent.payloads.row, range(len(sent))), strict=True)) == sorted(
-                zip(expected.sender.tolist(), map(expected.payloads.row, range(len(expected))), strict=True)
-            )
+            assert packets_of(sent) == packets_of(expected)
 
 
 def test_single_agents_run_without_arrays_and_vector_agents_with() -> None:

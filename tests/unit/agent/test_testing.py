@@ -18,7 +18,6 @@ from tests.support.agent.hosts import group, readings, received_from
 from tests.support.agent.one_step import agent_doing, vector_agent_doing
 from tests.support.agent.players import (
     Ageing,
-    Counter,
     Crowd,
     Means,
     Neighbour,
@@ -46,13 +45,9 @@ def test_rows_that_depend_on_others_are_caught(kind: type[VectorAgent]) -> None:
         assert_rows_independent(kind)
 
 
-@pytest.mark.parametrize("trial", TRIALS, ids=repr)
+@pytest.mark.parametrize("trial", [*TRIALS, Trial(params={"separation_m": 0.9, "alignment": 0.0})], ids=repr)
 def test_example_is_the_same_rule_as_the_behaviour(trial: Trial) -> None:
     assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Flocking, trial)
-
-
-def test_agent_and_vector_agent_of_one_rule_are_equivalent() -> None:
-    assert_equivalent(Counter, VectorCounter)
 
 
 @pytest.mark.parametrize("name", ["cohesion", "alignment", "avoidance", "forward", "speed_mps", "turn_gain_per_s"])
@@ -70,11 +65,6 @@ def test_different_packets_are_caught() -> None:
 
     with pytest.raises(AssertionError, match=r"packet 1: to: all \(MyFlocking\), nothing \(Silent\)"):
         assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Silent)
-
-
-def test_trial_parameters_reach_both_agents() -> None:
-    params = {"separation_m": 0.9, "alignment": 0.0}
-    assert_equivalent(load_agent(f"{EXAMPLE}:MyFlocking"), Flocking, Trial(params=params))
 
 
 class Reports(VectorAgent):

@@ -66,19 +66,14 @@ def test_command_lasts_until_the_next_and_nan_is_ignored():
     assert rig.loop.status()["counts"]["nan_commands"] == 1
 
 
-def test_agent_starts_once_all_its_sensors_delivered_readings():
-    rig = Rig("Driving", measures=(), body="epuck-gps", tracked=("compass",))
+def test_agent_starts_once_all_its_sensors_delivered_readings_or_after_three_seconds():
+    rig, blind = (Rig("Driving", measures=(), body="epuck-gps", tracked=("compass",)) for _ in range(2))
     assert not any(row.drive for row in rig.run(3))
     rig.pose = Pose(0.0, 0.0, 1.0)
     assert [row.drive for row in rig.run(2)[3:]] == [True, True]
     rig.pose = None  # once it has begun it is told that a reading is lost
     assert rig.run(1)[-1].drive
-
-
-def test_agent_starts_after_three_seconds_without_a_reading():
-    rig = Rig("Driving", measures=(), body="epuck-gps", tracked=("compass",))
-    rows = rig.run(33)
-    assert [row.tick for row in rows if row.drive] == [31, 32]
+    assert [row.tick for row in blind.run(33) if row.drive] == [31, 32]
 
 
 def test_command_above_the_limits_is_scaled_by_one_factor_and_counted():
@@ -147,19 +142,19 @@ def test_reconnection_pauses_double_up_to_two_seconds():
     assert [(later - earlier) // MS for earlier, later in pairwise(trials)] == [400, 800, 1600, 2000, 2000]
 
 
-def test_leds_are_sent_again_after_a_reconnection():
-    rig = Rig("Telling")
-    rig.driver.faults = {"sense": [None, lost]}
-    rig.run(3)
-    assert [command.leds for command in rig.driver.commands] == [{2: 0xFF0000}, {2: 0xFF0000}, {}]
-
-
 def test_packets_are_sent_when_the_driver_is_lost_and_counted_meanwhile():
     rig = Rig("Telling", radio=(radio := two_packets_later()))
     rig.driver.faults = {"act": [lost]}
     rig.run(1)
     assert len(radio.sent) == 2
     assert rig.loop.status()["counts"]["packets_without_driver"] == 2
+
+
+def test_leds_are_sent_again_after_a_reconnection():
+    rig = Rig("Telling")
+    rig.driver.faults = {"sense": [None, lost]}
+    rig.run(3)
+    assert [command.leds for command in rig.driver.commands] == [{2: 0xFF0000}, {2: 0xFF0000}, {}]
 
 
 def test_end_is_not_delayed_by_a_lost_robot():

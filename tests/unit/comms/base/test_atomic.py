@@ -1,6 +1,7 @@
 """Atomic writes: whole or not at all, and never through a link that somebody left in the folder."""
 
 import stat
+from pathlib import Path
 
 import pytest
 
@@ -18,22 +19,14 @@ def treasure(tmp_path):
 
 
 @pytest.mark.parametrize("link", [".aside-page.html", "page.html"])
-def test_write_replaces_a_link_and_leaves_its_target(tmp_path, treasure, link):
+@pytest.mark.parametrize("link_to", [Path.symlink_to, Path.hardlink_to])
+def test_write_replaces_a_link_and_leaves_its_target(tmp_path, treasure, link, link_to):
     page = tmp_path / "foreign" / "page.html"
-    page.with_name(link).symlink_to(treasure)
-    write_text(page, "report")
-    assert treasure.read_text() == "mine"
-    assert page.read_text() == "report"
-    assert not page.is_symlink()
-    assert [file.name for file in page.parent.iterdir()] == ["page.html"]
-
-
-def test_write_leaves_the_target_of_a_hard_link(tmp_path, treasure):
-    page = tmp_path / "foreign" / "page.html"
-    page.with_name(".aside-page.html").hardlink_to(treasure)
-    page.hardlink_to(treasure)
+    link_to(page.with_name(link), treasure)
     write_text(page, "report")
     assert (treasure.read_text(), page.read_text()) == ("mine", "report")
+    assert not page.is_symlink()
+    assert [file.name for file in page.parent.iterdir()] == ["page.html"]
 
 
 def test_write_that_fails_leaves_the_former_file_alone(tmp_path):
