@@ -96,6 +96,8 @@ def test_emergency_stop_out_of_reach_raises_but_latches() -> None:
     with pytest.raises(DriverLost):
         motors.control.estop()
     assert motors.control.stopped
+    motors.act(DRIVE)
+    assert driver.commands == []
 
 
 @pytest.mark.parametrize("number", SIGNALS)

@@ -142,6 +142,15 @@ def test_tune_changes_the_radio_graph():
     assert medium.radio == Radio(0.5)
 
 
+@pytest.mark.parametrize("loss", [0.0, 1.0])
+def test_tune_of_loss_applies_from_its_tick_on(loss: float):
+    """Also of a radio that has no such stage before or after."""
+    result = tuned(replace(LOSSY, loss=loss), {10: replace(LOSSY, loss=1.0 - loss)})
+    on_air_s = result.on_air("on_air_at_ns") / 1e9
+    lost = result.on_air("fate") == 3
+    assert (lost == ((on_air_s < 1.0) == (loss == 1.0))).all()
+
+
 def test_tunable_numbers_are_those_of_a_ramp():
     radio = Radio(range_m=2.0, loss=0.3, bursts=Bursts(good_s=1.0, bad_s=0.5), send_offset=0.02)
     numbers = numbers_of(radio)
