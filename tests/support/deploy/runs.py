@@ -28,6 +28,14 @@ from tests.support.world.locksteps import EncodedBackend
 
 ROOT = Path(__file__).parents[3]
 LOSSY = ROOT / "scenarios" / "flocking-lossy.toml"
+DISRUPTED = ROOT / "scenarios" / "flocking-disrupted.toml"
+# All that the scenario has happen in a minute, within four seconds.
+TIMES = {"0": (0.3, 1.5), "1": (0.6, 0.9), "2": (1.1, None), "3": (1.3, 1.2), "4": (2.7, None)}
+DISRUPTED_SHORT = [
+    "duration_s=4",
+    *(f"events.{i}.at_s={at_s}" for i, (at_s, _) in TIMES.items()),
+    *(f"events.{i}.for_s={for_s}" for i, (_, for_s) in TIMES.items() if for_s),
+]
 WATCHER = """
 import sys
 from pathlib import Path

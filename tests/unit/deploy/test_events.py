@@ -6,45 +6,19 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.deploy import Result, RunFolder, Simulation, repeat, run
 from swarmwire.deploy.campaigns.columns import responses_of, row_of
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.custom_code import CODE
-from tests.support.deploy.runs import PER_ROBOT, ROOT, run_spread
-
-DISRUPTED = ROOT / "scenarios" / "flocking-disrupted.toml"
-# All that the scenario has happen in a minute, within four seconds.
-TIMES = {"0": (0.3, 1.5), "1": (0.6, 0.9), "2": (1.1, None), "3": (1.3, 1.2), "4": (2.7, None)}
-SHORT = [
-    "duration_s=4",
-    *(f"events.{i}.at_s={at_s}" for i, (at_s, _) in TIMES.items()),
-    *(f"events.{i}.for_s={for_s}" for i, (_, for_s) in TIMES.items() if for_s),
-]
+from tests.support.deploy.joiners import Watcher
+from tests.support.deploy.runs import DISRUPTED, DISRUPTED_SHORT, PER_ROBOT, run_spread
 
 
 @pytest.fixture(scope="module")
 def local() -> Result:
-    return run(DISRUPTED, overrides=SHORT)
-
-
-@pytest.mark.parametrize("runners", [1, 3, PER_ROBOT])
-def test_events_of_every_kind_give_the_same_run_in_every_layout(local, runners):
-    """Per robot, runners are left with nobody alive, and get their robot back."""
-    spread = run_spread(DISRUPTED, runners, overrides=SHORT)
-    assert spread.trajectory_sha256 == local.trajectory_sha256
-    assert (spread.radio, spread.metrics, spread.events) == (local.radio, local.metrics, local.events)
-
-
-@pytest.mark.parametrize("runners", [None, 2])
-def test_arena_with_events_is_the_same_alone_and_among_others(local, runners):
-    three = run_spread(DISRUPTED, runners, overrides=SHORT, seeds=[5, 1, 9])
-    assert three.trajectory_sha256[1] == local.trajectory_sha256[0]
-    assert three.arenas[1].radio == local.radio
-    assert [event.robots[1] for event in three.events] == [event.robots[0] for event in local.events]
-    assert three.events[1].robots[0] != three.events[1].robots[1], "every arena draws its own robots"
+    return run(DISRUPTED, overrides=DISRUPTED_SHORT)
 
 
 def test_summary_lists_events_with_tick_and_robots(local, tmp_path):
@@ -58,7 +32,7 @@ def test_summary_lists_events_with_tick_and_robots(local, tmp_path):
         (25, "partition", True),
         (27, "revive", False),
     ]
-    run(DISRUPTED, overrides=SHORT, out=tmp_path / "run")
+    run(DISRUPTED, overrides=DISRUPTED_SHORT, out=tmp_path / "run")
     told = json.loads((tmp_path / "run" / "summary.json").read_text())["events"]
     killed = local.events[1].robots[0]
     expected = {"at_s": 0.6, "tick": 6, "do": "kill", "part": "", "ended": False, "singly": False, "robots": killed}
@@ -74,7 +48,7 @@ def test_fates_add_up_and_each_disruption_has_its_own(local):
 
 
 def test_event_after_the_end_changes_nothing():
-    late = [f"events.{i}.at_s=1000" for i in TIMES]
+    late = [f"events.{i}.at_s=1000" for i in range(5)]
     result = run(DISRUPTED, overrides=["duration_s=2", *late])
     assert result.events == ()
     assert result.trajectory_sha256 == run(DISRUPTED, overrides=["duration_s=2", "events=[]"]).trajectory_sha256
@@ -100,25 +74,17 @@ events = [{ at_s = 0.5, do = "kill", robots = { names = ["a-0"] }, for_s = 0.3 }
 """
 
 
-class Speeds(Observer):
-    """Keeps the speeds asked for, in mm/s."""
-
-    def begin(self, static):
-        self.seen = []
-
-    def see(self, truth):
-        self.seen.append((truth.command[:, 0] * 1000).round().tolist())
-
-
 @pytest.mark.parametrize("runners", [None, PER_ROBOT])
 def test_revived_robot_starts_without_memory(tmp_path, runners):
     """Its speed tells how many steps it remembers; it is dead in ticks 5 to 7."""
     (tmp_path / "mine.py").write_text(REMEMBERS)
     scenario = tmp_path / "s.toml"
     scenario.write_text(AFRESH)
-    speeds = Speeds()
-    run_spread(scenario, runners, observers=[speeds])
-    assert speeds.seen == [[1, 1], [2, 2], [3, 3], [4, 4], [5, 5], [0, 6], [0, 7], [0, 8], [1, 9], [2, 10]]
+    watcher = Watcher()
+    run_spread(scenario, runners, observers=[watcher])
+    speeds_mmps = np.array([truth.command[:, 0] for truth in watcher.truths]) * 1000
+    assert speeds_mmps[:, 0].round().tolist() == [1, 2, 3, 4, 5, 0, 0, 0, 1, 2]
+    assert speeds_mmps[:, 1].round().tolist() == list(range(1, 11))
 
 
 SCENARIO = """

@@ -8,12 +8,11 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.threads import WORTH_ROWS
-from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, Simulation, run
 from swarmwire.deploy.runs import backends
 from tests.support.agent.hosts import PLAYERS
-from tests.support.deploy.runs import LOSSY, PER_ROBOT, ROOT, run_spread
+from tests.support.deploy.joiners import Watcher
+from tests.support.deploy.runs import DISRUPTED, DISRUPTED_SHORT, LOSSY, PER_ROBOT, ROOT, run_spread
 from tests.support.world.locksteps import EncodedBackend
 
 SHORT = ["duration_s=1.5"]
@@ -49,9 +48,8 @@ def test_shipped_scenarios_run_alike_through_frames(monkeypatch, scenario):
     assert [arena.radio for arena in through_frames.arenas] == [arena.radio for arena in directly.arenas]
 
 
-@pytest.mark.parametrize("split", [{"runners": 1}, {"runners": 1000}, {"backwards": True}], ids=str)
-def test_into_how_many_parts_robots_are_split_and_who_gets_which_does_not_matter(monkeypatch, local, split):
-    result = encoded(monkeypatch, LOSSY, **split)
+def test_assignment_of_robots_to_parts_does_not_matter(monkeypatch, local):
+    result = encoded(monkeypatch, LOSSY, backwards=True)
     assert result.trajectory_sha256 == local.trajectory_sha256
     assert (result.radio, result.metrics) == (local.radio, local.metrics)
 
@@ -79,10 +77,8 @@ def test_agent_of_a_user_with_the_same_rule_gives_the_same_run(local):
     assert run(LOSSY, overrides=[*SHORT, mine]).trajectory_sha256 == local.trajectory_sha256
 
 
-@pytest.mark.parametrize("through_frames", [False, True])
-def test_arena_is_the_same_alone_and_as_one_of_eight(monkeypatch, local, through_frames):
-    seeds = range(1, 9)
-    eight = encoded(monkeypatch, LOSSY, seeds=seeds) if through_frames else run(LOSSY, overrides=SHORT, seeds=seeds)
+def test_arena_is_the_same_alone_and_as_one_of_eight(local):
+    eight = run(LOSSY, overrides=SHORT, seeds=range(1, 9))
     assert eight.trajectory_sha256[0] == local.trajectory_sha256[0]
     assert eight.trajectory_sha256[4] == run(LOSSY, overrides=SHORT, seed=5).trajectory_sha256[0]
     assert (eight.arenas[0].radio, eight.arenas[0].metrics) == (local.radio, local.metrics)
@@ -92,39 +88,6 @@ def test_arena_is_the_same_alone_and_as_one_of_eight(monkeypatch, local, through
 def test_another_seed_or_another_loss_is_another_run(local):
     assert run(LOSSY, overrides=SHORT, seed=2).trajectory_sha256 != local.trajectory_sha256
     assert run(LOSSY, overrides=[*SHORT, "radio.loss=0.31"]).trajectory_sha256 != local.trajectory_sha256
-
-
-PSO = Path(__file__).parents[3] / "scenarios" / "pso.toml"
-
-
-class StatesSeen(Observer):
-    """Observer that keeps the states of all ticks."""
-
-    def __init__(self) -> None:
-        self.ticks: list[list[str]] = []
-
-    def see(self, truth: Truth) -> None:
-        self.ticks.append([truth.states[code] for code in truth.state])
-
-
-def states(runners: int | None, seeds: Sequence[int]) -> list[list[str]]:
-    seen = StatesSeen()
-    run_spread(PSO, runners, seeds=seeds, overrides=["duration_s=15"], observers=[seen])
-    return seen.ticks
-
-
-@pytest.fixture(scope="module")
-def alone() -> list[list[str]]:
-    return states(None, [2])
-
-
-def test_states_are_the_same_however_the_agents_are_spread(alone: list[list[str]]) -> None:
-    assert states(3, [2]) == alone
-    assert {"to its own best", "to the neighbours' best"} <= set(alone[-1])
-
-
-def test_states_of_an_arena_are_the_same_beside_others(alone: list[list[str]]) -> None:
-    assert [tick[-10:] for tick in states(None, [5, 2])] == alone
 
 
 MIXED = """
@@ -174,64 +137,8 @@ class Counting(Agent):
         robot.drive(0.01 * (self.words % 7), robot.odometry.left_m - robot.odometry.right_m + 0.2)
         robot.radio.send(Word(number=self.steps))
 """
-
-
-SLOW = "robots.flock.act_every_ticks=4"
-
-
-def radio_of(scenario, *overrides):
-    radio = run(scenario, overrides=overrides).radio
-    assert radio is not None
-    return radio
-
-
-@pytest.fixture
-def mixed(tmp_path):
-    (tmp_path / "counting.py").write_text(COUNTING)
-
-    def written(scouts=1, every=3, carriers="counting.py:Counting"):
-        path = tmp_path / f"mixed-{scouts}-{every}.toml"
-        path.write_text(MIXED.format(scouts=scouts, every=every, carriers=carriers))
-        return path
-
-    return written
-
-
-@pytest.mark.parametrize(("scouts", "every"), [(1, 3), (2, 5)])
-def test_groups_of_different_rates_run_alike_in_every_layout(mixed, scouts, every):
-    path = mixed(scouts, every)
-    short = ["duration_s=3"]
-    local = run(path, seeds=[1, 2], overrides=short)
-    for runners in (1, 3, PER_ROBOT):
-        other = run_spread(path, runners, seeds=[1, 2], overrides=short)
-        assert other.trajectory_sha256 == local.trajectory_sha256
-        assert [arena.radio for arena in other.arenas] == [arena.radio for arena in local.arenas]
-    assert run(path, seed=2, overrides=short).trajectory_sha256[0] == local.trajectory_sha256[1]
-
-
-def test_group_sends_as_often_as_it_acts(mixed):
-    radio = radio_of(mixed(1, 3))
-    assert radio.sent == 5 * 60 + 4 * 20
-    assert sum(radio.fates.values()) == radio.intended == 8 * radio.sent
-
-
-def test_packets_reach_a_slow_agent_at_the_tick_at_which_it_acts():
-    every = ["duration_s=20", "radio.loss=0", "radio.jitter_s=0", "radio.send_offset='tick'", "radio.latency_s=0.05"]
-    fast = radio_of(LOSSY, *every)
-    slow = radio_of(LOSSY, *every, SLOW)
-    assert fast.latency_agent_s.p50 == pytest.approx(0.1, rel=0.005)
-    assert slow.latency_agent_s.p50 == pytest.approx(0.4, rel=0.005)
-    assert slow.latency_air_s == fast.latency_air_s
-
-
-@pytest.mark.parametrize("value", ["0", "1.5", "'2'"])
-def test_act_every_ticks_that_cannot_be_is_refused(value):
-    with pytest.raises(BadInput, match="robots.flock.act_every_ticks"):
-        run(LOSSY, overrides=[f"robots.flock.act_every_ticks={value}"])
-
-
 # One group acts in every third tick only, and some of the other are dead for a while.
-SCENARIO = f"""
+INSISTING = f"""
 format = 1
 name = "insisting"
 duration_s = 3.0
@@ -252,38 +159,130 @@ do = "kill"
 robots = {{ group = "often", count = 2 }}
 for_s = 0.5
 """
+SEEKER = """
+from swarmwire.agent import Agent
+
+class Seeker(Agent):
+    needs = ("light", "bumper", "positioning")
+
+    def step(self, robot):
+        x, y = robot.light.vector_sum()
+        turn = 1.0 if robot.bumper.pressed else y - 0.1 * robot.positioning.x_m
+        robot.drive(linear_mps=0.05 + 0.05 * x, angular_radps=turn)
+
+class Stone(Agent):
+    def step(self, robot): ...
+"""
+LIT = """
+format = 1
+name = "to the light"
+duration_s = 3
+[arena]
+size_m = [3, 3]
+lights = [{ intensity = 2.0, place = "random" }]
+obstacles = [{ shape = "polygon", points = [[0, 0], [0.4, 0], [0, 0.4]], count = 3, place = "random" }]
+[robots.moths]
+body = "epuck-gps"
+count = 10
+agent = "seeker.py:Seeker"
+[robots.stones]
+body = "kilobot"
+count = 2
+agent = "seeker.py:Stone"
+"""
+RATES = {"scouts": 1, "every": 3, "carriers": "counting.py:Counting"}
+VECTOR = [f"robots.{name}.agent={PLAYERS}:VectorInsisting" for name in ("often", "seldom")]
+# Text or file of a scenario, and its overrides: what is hard to split among runners, and arenas.
+DEMANDING: dict[str, tuple[str | Path, list[str]]] = {
+    "every kind of event": (DISRUPTED, DISRUPTED_SHORT),
+    "two rates": (MIXED.format(**RATES), ["duration_s=3"]),
+    "slow groups": (MIXED.format(**RATES | {"scouts": 2, "every": 5}), ["duration_s=3"]),
+    "agents that send again": (INSISTING, []),
+    "senses of light, touch and place": (LIT, []),
+}
 
 
-@pytest.fixture(scope="module")
-def insisting(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("tx_status") / "insisting.toml"
-    path.write_text(SCENARIO)
-    return path
+def written(folder: Path, text: str) -> Path:
+    """A scenario beside its agents."""
+    (folder / "counting.py").write_text(COUNTING)
+    (folder / "seeker.py").write_text(SEEKER)
+    (folder / "scenario.toml").write_text(text)
+    return folder / "scenario.toml"
 
 
-@pytest.fixture(scope="module")
-def insisting_alone(insisting: Path) -> Result:
-    return run(insisting, seeds=[1, 2])
+@pytest.fixture(scope="module", params=DEMANDING.values(), ids=DEMANDING)
+def demanding(request, tmp_path_factory) -> tuple[Path, list[str], Result]:
+    """A scenario, its overrides, and its run in one process with two arenas."""
+    source, overrides = request.param
+    scenario = source if isinstance(source, Path) else written(tmp_path_factory.mktemp("demanding"), source)
+    return scenario, overrides, run(scenario, seeds=[2, 1], overrides=overrides)
 
 
 @pytest.mark.parametrize("runners", [1, 3, PER_ROBOT])
-def test_agents_that_send_again_do_so_alike_in_one_process_and_in_many(
-    insisting: Path, insisting_alone: Result, runners
-):
-    found = run_spread(insisting, runners, seeds=[1, 2])
-    assert found.trajectory_sha256 == insisting_alone.trajectory_sha256
+def test_demanding_scenarios_run_alike_in_every_layout(demanding, runners):
+    """Per robot, runners are left with nobody alive, and get their robot back."""
+    scenario, overrides, local = demanding
+    spread = run_spread(scenario, runners, seeds=[2, 1], overrides=overrides)
+    assert (spread.arenas, spread.events) == (local.arenas, local.events)
 
 
-@pytest.mark.parametrize("runners", [None, 2])
-def test_vector_agents_give_the_same_run_as_agents(insisting: Path, insisting_alone: Result, runners):
-    vector = [f"robots.{name}.agent={PLAYERS}:VectorInsisting" for name in ("often", "seldom")]
-    found = run_spread(insisting, runners, seeds=[1, 2], overrides=vector)
-    assert found.trajectory_sha256 == insisting_alone.trajectory_sha256
+def test_arena_of_a_demanding_scenario_is_the_same_alone_and_among_others(demanding):
+    scenario, overrides, local = demanding
+    alone = run(scenario, seed=1, overrides=overrides)
+    assert alone.arenas == local.arenas[1:]
+    assert [event.robots[0] for event in alone.events] == [event.robots[1] for event in local.events]
 
 
-def test_tx_status_reaches_every_robot_even_if_it_sends_to_itself(insisting: Path):
+def test_vector_agents_give_the_same_run_as_agents(tmp_path: Path):
+    insisting = written(tmp_path, INSISTING)
+    agents = run(insisting)
+    for runners in (None, 2):
+        vector = run_spread(insisting, runners, overrides=VECTOR)
+        assert vector.trajectory_sha256 == agents.trajectory_sha256
+
+
+def states(runners: int | None, seeds: Sequence[int]) -> list[list[str]]:
+    """States that robots of a particle swarm note, (ticks, robots)."""
+    watcher = Watcher()
+    pso = ROOT / "scenarios" / "pso.toml"
+    run_spread(pso, runners, seeds=seeds, overrides=["duration_s=15"], observers=[watcher])
+    return [[truth.states[code] for code in truth.state] for truth in watcher.truths]
+
+
+def test_states_are_the_same_in_every_layout_and_beside_other_arenas():
+    alone = states(None, [2])
+    assert states(3, [2]) == alone
+    assert {"to its own best", "to the neighbours' best"} <= set(alone[-1])
+    assert [tick[-10:] for tick in states(None, [5, 2])] == alone
+
+
+SLOW = "robots.flock.act_every_ticks=4"
+
+
+def radio_of(scenario, *overrides):
+    radio = run(scenario, overrides=overrides).radio
+    assert radio is not None
+    return radio
+
+
+def test_group_sends_as_often_as_it_acts(tmp_path):
+    radio = radio_of(written(tmp_path, MIXED.format(**RATES)))
+    assert radio.sent == 5 * 60 + 4 * 20
+    assert sum(radio.fates.values()) == radio.intended == 8 * radio.sent
+
+
+def test_packets_reach_a_slow_agent_at_the_tick_at_which_it_acts():
+    every = ["duration_s=20", "radio.loss=0", "radio.jitter_s=0", "radio.send_offset='tick'", "radio.latency_s=0.05"]
+    fast = radio_of(LOSSY, *every)
+    slow = radio_of(LOSSY, *every, SLOW)
+    assert fast.latency_agent_s.p50 == pytest.approx(0.1, rel=0.005)
+    assert slow.latency_agent_s.p50 == pytest.approx(0.4, rel=0.005)
+    assert slow.latency_air_s == fast.latency_air_s
+
+
+def test_tx_status_reaches_every_robot_even_if_it_sends_to_itself(tmp_path: Path):
     """Or the tests above would say nothing: robots drive as fast as they were told of, and else stand."""
-    with Simulation(insisting) as simulation:
+    with Simulation(written(tmp_path, INSISTING)) as simulation:
         last = [simulation.step() for _ in range(30)][-1]
     assert (last.command[:, 0] > 0.0).all()
 
@@ -298,11 +297,9 @@ def test_tx_status_reaches_every_robot_even_if_it_sends_to_itself(insisting: Pat
         None,
     ],
 )
-def test_agent_needing_tx_status_is_refused_without_acknowledgements(
-    insisting: Path, tmp_path: Path, radio: str | None
-):
+def test_agent_needing_tx_status_is_refused_without_acknowledgements(tmp_path: Path, radio: str | None):
     path = tmp_path / "refused.toml"
-    before, after = SCENARIO.split("[radio]")
+    before, after = INSISTING.split("[radio]")
     path.write_text(f"{before}\n[[events]]{after.split('[[events]]')[1]}")
     with pytest.raises(BadInput) as caught:
         run(path, overrides=[f"radio={radio}"] if radio else [])

@@ -8,7 +8,6 @@ from typer.testing import CliRunner
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Recording, RunFolder, run
@@ -19,8 +18,12 @@ from swarmwire.metrics.records.run_folder.ticks import TickRecorder
 from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.metrics.records.run_folder.writer import write_file
 from tests.support.clocks import GoingClock
+from tests.support.deploy.joiners import Watcher
 from tests.support.deploy.runs import LOSSY, ROOT, hastily, record_run, run_spread
 
+SIGNALS = ROOT / "scenarios" / "flocking-802154.toml"
+JAMMED = ROOT / "scenarios" / "jammed.toml"
+TABLES = ("radio_robots", "radio_distances", "radio_links")
 EVENTS = [
     "duration_s=6",
     'events=[{at_s=1.0, do="kill", robots={group="flock", share=0.2}, for_s=2.0},'
@@ -42,18 +45,19 @@ class Stating(Agent):
 """
 
 
-class Keeper(Observer):
-    """Keeps every truth."""
+class Keeper(Watcher):
+    """Keeps every truth and the metrics of its tick."""
 
     def __init__(self):
-        self.seen, self.metrics, self._metrics = [], [], Metrics()
+        super().__init__()
+        self.metrics, self._metrics = [], Metrics()
 
     def begin(self, static):
         self._metrics.begin(static)
 
     def see(self, truth):
+        super().see(truth)
         self._metrics.see(truth)
-        self.seen.append(truth)
         self.metrics.append({name: values.copy() for name, values in self._metrics.latest.items()})
 
 
@@ -71,11 +75,11 @@ def test_recorded_tables_equal_the_observers_view_and_the_summary(tmp_path):
     for arena, of_arena in enumerate(result.arenas):
         rows = slice(arena * 20, arena * 20 + 20)
         ticks = recorded.ticks(arena)
-        pose = np.array([truth.pose[rows] for truth in keeper.seen], np.float32)
+        pose = np.array([truth.pose[rows] for truth in keeper.truths], np.float32)
         for place, column in enumerate(("x_m", "y_m", "heading_rad")):
             assert np.array_equal(ticks[column].to_numpy(), pose[:, :, place])
-        assert ticks["alive"].to_list() == [truth.alive[rows].tolist() for truth in keeper.seen]
-        states = [[truth.states[code] for code in truth.state[rows]] for truth in keeper.seen]
+        assert ticks["alive"].to_list() == [truth.alive[rows].tolist() for truth in keeper.truths]
+        states = [[truth.states[code] for code in truth.state[rows]] for truth in keeper.truths]
         assert ticks["state"].to_list() == states
         assert {"east", "west"} <= {state for row in states for state in row}
         for name, statistics in of_arena.metrics.items():
@@ -96,26 +100,26 @@ def test_recorded_tables_equal_the_observers_view_and_the_summary(tmp_path):
     assert len(happened) == 4
 
 
-def test_sampled_packets_are_the_same_in_every_layout(tmp_path):
-    tables = []
-    for name, options in {
-        "alone": {"seed": 3},
-        "in parts": {"seed": 3, "runners": 3},
-        "among others": {"seeds": [9, 3]},
-    }.items():
-        folder = tmp_path / name
-        record, parts = Recording(packets=0.1, rrd=False), options.pop("runners", None)
-        run_spread(LOSSY, parts, out=folder, record=record, overrides=["duration_s=3"], **options)
-        arena = 1 if "seeds" in options else 0
-        tables.append(RunFolder(folder).packets(arena).drop("arena"))
-        summary = RunFolder(folder).summary
-        assert summary is not None
-        assert summary["record"]["packets"]["share"] == 0.1
-    columns = ["sender", "sequence", "receiver"]
-    alone, *others = (table.sort(columns, maintain_order=True) for table in tables)
-    assert 0 < len(alone) < 2000
-    for other in others:
-        assert other.equals(alone)
+@pytest.mark.parametrize("scenario", [LOSSY, SIGNALS], ids=lambda path: path.stem)
+def test_tables_of_packets_and_radio_are_the_same_in_every_layout(tmp_path, scenario):
+    def recorded(name: str, runners: int | None = None, **seeds) -> RunFolder:
+        record = Recording(packets=0.1, links=True, rrd=False)
+        run_spread(scenario, runners, out=tmp_path / name, record=record, overrides=["duration_s=3"], **seeds)
+        assert all(finding.good for finding in verify(tmp_path / name))
+        return RunFolder(tmp_path / name)
+
+    def packets(folder: RunFolder, arena: int = 0) -> pl.DataFrame:
+        return folder.packets(arena).drop("arena").sort("sender", "sequence", "receiver", maintain_order=True)
+
+    alone, parts, others = recorded("alone", seed=3), recorded("parts", 3, seed=3), recorded("others", seeds=[9, 3])
+    assert alone.summary is not None
+    assert alone.summary["record"]["packets"]["share"] == 0.1
+    assert 0 < len(packets(alone)) < 0.2 * alone.summary["radio"]["intended"]
+    assert packets(alone).equals(packets(parts))
+    assert packets(alone).equals(packets(others, 1))
+    for table in TABLES:
+        assert len(getattr(alone, table)()) > 0
+        assert_frame_equal(getattr(alone, table)(), getattr(parts, table)())
 
 
 def test_full_disk_leaves_the_run_going_and_its_tables_readable(tmp_path, monkeypatch, capfd):
@@ -127,37 +131,18 @@ def test_full_disk_leaves_the_run_going_and_its_tables_readable(tmp_path, monkey
         write_file(frame, path)
 
     monkeypatch.setattr(writer, "write_file", full)
-    metrics, keeper = Metrics(), Keeper()
+    metrics, watcher = Metrics(), Watcher()
     recorder = TickRecorder(tmp_path, metrics, GoingClock(NS_PER_S // 10))
-    result = run(LOSSY, overrides=["duration_s=8"], observers=[metrics, recorder, keeper])
+    result = run(LOSSY, overrides=["duration_s=8"], observers=[metrics, recorder, watcher])
     assert result.ended == "duration"
     assert result.counts["observer_failed_TickRecorder"] == 1
-    assert len(keeper.seen) == result.ticks == 80
+    assert len(watcher.truths) == result.ticks == 80
     errors = capfd.readouterr().err
     assert "the run continues" in errors
     assert "No space left on device" in errors
     ticks = RunFolder(tmp_path).ticks()
     assert 0 < len(ticks) < 80
     assert ticks["tick"].to_list() == list(range(len(ticks)))
-
-
-SIGNALS = ROOT / "scenarios" / "flocking-802154.toml"
-JAMMED = ROOT / "scenarios" / "jammed.toml"
-TABLES = ("radio_robots", "radio_distances", "radio_links")
-
-
-@pytest.mark.parametrize("scenario", [LOSSY, SIGNALS], ids=lambda path: path.stem)
-def test_tables_of_the_radio_are_alike_in_one_process_and_in_many_and_agree_with_the_summary(tmp_path, scenario):
-    folders = {}
-    for name, runners in (("one", None), ("many", 3)):
-        record = Recording(links=True, rrd=False)
-        run_spread(scenario, runners, overrides=["duration_s=2"], out=tmp_path / name, record=record)
-        folders[name] = RunFolder(tmp_path / name)
-        assert all(finding.good for finding in verify(tmp_path / name))
-    for table in TABLES:
-        one, many = (getattr(folder, table)() for folder in folders.values())
-        assert len(one) > 0
-        assert_frame_equal(one, many)
 
 
 def test_jammed_packets_are_counted_for_sender_receiver_and_link(tmp_path):
@@ -197,13 +182,10 @@ def test_links_without_a_place_for_them_are_refused():
     assert "--links: expected --out" in str(refusal)
 
 
-SCENARIO = ROOT / "scenarios" / "flocking-802154.toml"
-
-
 @pytest.mark.parametrize("preset", PRESETS)
 def test_radio_presets_all_carry_a_flock(preset: str):
     radio = f'radio={{preset="{preset}",measures={{range={{}},bearing={{}}}},max_payload_bytes=6}}'
-    result = run(SCENARIO, overrides=["duration_s=1", "robots.flock.count=5", radio])
+    result = run(SIGNALS, overrides=["duration_s=1", "robots.flock.count=5", radio])
     assert result.radio is not None
     assert result.radio.sent > 40
     assert sum(result.radio.fates.values()) == result.radio.intended == 4 * result.radio.sent

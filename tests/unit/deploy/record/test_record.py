@@ -11,7 +11,6 @@ import pytest
 
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.runs.config import Recording
@@ -20,6 +19,7 @@ from swarmwire.deploy.runs.record.replay_logs import LiveEventsLog, read_live_ev
 from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
 from tests.integration.metrics.viewer.test_recording import class_names, column, series
+from tests.support.deploy.joiners import Watcher
 from tests.support.deploy.runs import LOSSY
 
 pytest.importorskip("rerun", reason="needs the extra [view]")
@@ -27,23 +27,13 @@ pytest.importorskip("rerun", reason="needs the extra [view]")
 DURATION_S, RATE_HZ = 8, 10
 
 
-class Seen(Observer):
-    """Observer that keeps every tick."""
-
-    def __init__(self):
-        self.ticks = []
-
-    def see(self, truth):
-        self.ticks.append(truth)
-
-
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """A run of a flock in which a fifth dies after 4 s: its recording, its result and its ticks."""
-    out, seen = tmp_path_factory.mktemp("runs") / "run", Seen()
+    out, seen = tmp_path_factory.mktemp("runs") / "run", Watcher()
     event = 'events=[{at_s=4.0,do="kill",robots={group="flock",share=0.2}}]'
     result = run(LOSSY, overrides=[f"duration_s={DURATION_S}", event], out=out, observers=[seen])
-    return out / "run.rrd", result, seen.ticks
+    return out / "run.rrd", result, seen.truths
 
 
 def test_positions_and_who_is_dead_are_the_runs(recorded):
