@@ -14,9 +14,6 @@ from swarmwire.world.scenario_file import load_scenario
 from tests.support.deploy.certificates import DatedFakeClock
 from tests.support.deploy.runs import LOSSY, called
 
-AGENTS = """
-import no_such_module_anywhere
-"""
 NEEDY = """
 from swarmwire.agent import Agent, Robot
 
@@ -27,15 +24,6 @@ class Needy(Agent):
 class Rssi(Agent):
     needs = ("radio.rssi",)
     def step(self, robot: Robot) -> None: ...
-
-class Lazy(Agent):
-    pass
-
-class Strict(Agent):
-    level: int
-    def step(self, robot: Robot) -> None: ...
-
-helper = 3
 """
 LANE_AGENTS = """
 from swarmwire.agent import Agent, PerRobot, Robot, Robots, Memory, VectorAgent
@@ -49,41 +37,12 @@ class Lone(Agent):
     def step(self, robot: Robot) -> None: ...
 """
 THREE = "robots.flock={body='epuck', count=3, agent="
-SOME = "robots={count=1}"
-BETWEEN = "do='partition', between"
-POLYGON = "{shape='polygon', at=[0, 0]"
-REFUSED = [  # a setting, and the key that the line names
-    ("robots.flock.cuont=3", "robots.flock.cuont"),
-    ("rdio={}", "rdio"),
-    ("robots.flock.count='x'", "robots.flock.count"),
+REFUSED = [  # a setting, and the key that the line names; all keys of scenarios are tested in world/scenario
     ("robots.flock.count=0", "robots.flock.count"),
-    ("robots.flock.act_every_ticks=0", "robots.flock.act_every_ticks"),
-    ("robots.flock.act_every_ticks=1.5", "robots.flock.act_every_ticks"),
-    ("radio.loss=1.5", "radio.loss"),
-    ("radio.range_m=-1", "radio.range_m"),
-    ("radio.model='fog'", "radio.model"),
-    ("radio.send_offset='sometimes'", "radio.send_offset"),
-    ("radio.send_offset=-0.1", "radio.send_offset"),
-    ("radio.bit_rate_bps=1000000000000000000000", "radio.bit_rate_bps"),
-    ("radio.queue_limit=1000000000000000000000", "radio.queue_limit"),
-    ("duration_s=0", "duration_s"),
-    ("format=2", "format"),
     ("physics.steps=1", "physics.steps"),
-    ("robots.flock.body='blimp'", "robots.flock.body"),
     ("robots.flock.place.radius_m=0.1", "robots.flock.place"),
     ("robots.flock.params.separation=1", "robots.flock.params.separation"),
-    ("robots.flock.params.separation_m='far'", "robots.flock.params.separation_m"),
-    ("robots.flock.params.separation_m=nan", "robots.flock.params.separation_m"),
-    ("robots.flock.params.separation_m=99999999999999999999", "robots.flock.params.separation_m"),
-    ("robots.flock.agent='nowhere.at.all:X'", "robots.flock.agent"),
-    ("robots.flock.agent='swarmwire.agent.behaviours:Dance'", "robots.flock.agent"),
     ("robots.flock.agent='flocking'", "robots.flock.agent"),
-    ("robots.flock.agent='math:pi'", "robots.flock.agent"),
-    ("robots.flock.agent='absent.py:X'", "robots.flock.agent"),
-    ("robots.flock.agent='broken.py:X'", "robots.flock.agent"),
-    ("robots.flock.agent='needy.py:helper'", "robots.flock.agent"),
-    ("robots.flock.agent='needy.py:Lazy'", "robots.flock.agent"),
-    (f"{THREE}'needy.py:Strict'}}", "robots.flock.params.level"),
     (f"{THREE}'needy.py:Needy'}}", "robots.flock.agent"),
     (f"{THREE}'needy.py:Rssi'}}", "robots.flock.agent"),
     (f"{THREE}'lanes.py:Lanes'}}", "robots.flock.params.lane"),
@@ -91,37 +50,13 @@ REFUSED = [  # a setting, and the key that the line names
     (f"{THREE}'lanes.py:Lanes', params={{lane=[1, 2, 0.5]}}}}", "robots.flock.params.lane"),
     (f"{THREE}'lanes.py:Lone'}}", "robots.flock.agent"),
     ("radio.measures={}", "robots.flock.agent"),
-    ("events=3", "events"),
-    ("events=[{at_s=1}]", "events.0.do"),
-    ("events=[{at_s=1, do='burn'}]", "events.0.do"),
-    (f"events=[{{at_s=nan, do='kill', {SOME}}}]", "events.0.at_s"),
-    (f"events=[{{at_s=1, do='kill', {SOME}, for_s=0}}]", "events.0.for_s"),
-    ("events=[{at_s=1, do='kill', robots=3}]", "events.0.robots"),
-    ("events=[{at_s=1, do='kill', robots={grup='flock'}}]", "events.0.robots.grup"),
     ("events=[{at_s=1, do='kill', robots={group='flok'}}]", "events.0.robots.group"),
-    ("events=[{at_s=1, do='revive', robots={names=['flock-20']}}]", "events.0.robots.names"),
-    ("events=[{at_s=1, do='kill', robots={share=5}}]", "events.0.robots.share"),
-    (f"events=[{{at_s=1, {BETWEEN}=['flock-0', 'flock-1']}}]", "events.0.between.0"),
-    (f"events=[{{at_s=1, {BETWEEN}=[['flock'], ['flock-1']]}}]", "events.0.between.1"),
-    ("arena.lights=[{intensity=1, at=[0, 0], place='random'}]", "arena.lights.0"),
-    ("arena.lights=[{intensity=-1, at=[0, 0]}]", "arena.lights.0.intensity"),
-    ("arena.lights=[{intensity=1, at=[0, 0], colour='red'}]", "arena.lights.0.colour"),
-    ("arena.lights=[{intensity=1, at=[9, 0]}]", "arena.lights.0"),
-    (f"arena.obstacles=[{POLYGON}}}]", "arena.obstacles.0.points"),
-    (f"arena.obstacles=[{POLYGON}, points=[[0, 0], [1, 0], ['x', 1]]}}]", "arena.obstacles.0.points.2.0"),
-    (f"arena.obstacles=[{POLYGON}, points=[[0, 0], [1, 1], [1, 0], [0, 1]]}}]", "arena.obstacles.0.points"),
-    ("arena.obstacles=[{shape='polygon', at=[4, 0], points=[[0, 0], [1, 0], [0, 1]]}]", "arena.obstacles.0"),
-    (
-        "arena.obstacles=[{shape='polygon', place='random', count=99, points=[[0, 0], [3, 0], [0, 3]]}]",
-        "arena.obstacles.0",
-    ),
 ]
 
 
 @pytest.fixture
 def agents(tmp_path):
     (tmp_path / "lanes.py").write_text(LANE_AGENTS)
-    (tmp_path / "broken.py").write_text(AGENTS)
     (tmp_path / "needy.py").write_text(NEEDY)
     scenario = tmp_path / "scenario.toml"
     scenario.write_text(LOSSY.read_text())
@@ -147,10 +82,11 @@ def test_bad_value_is_refused_with_its_file_or_option_and_key(agents, setting, k
 @pytest.mark.parametrize(
     ("command", "arguments"),
     [
-        *(("check", [LOSSY, "--set", setting]) for setting, _ in REFUSED[::9]),
+        ("check", [LOSSY, "--set", "robots.flock.place.radius_m=0.1"]),
         ("run", [LOSSY, "--set", "robots.flock.count=many"]),
         ("run", [LOSSY, "--seeds", "9:1"]),
         ("run", [LOSSY, "--runners", "all"]),
+        ("run", [LOSSY, "--realtime", "-2"]),
         ("run", ["absent.toml"]),
         ("check", [LOSSY, "--set", "nonsense"]),
     ],
@@ -199,8 +135,7 @@ def test_files_that_are_no_scenario_are_named(tmp_path):
     ("options", "name"),
     [
         *(({"runners": runners}, "runners") for runners in (0, 21, "many", True)),
-        *(({"seeds": seeds}, "seeds") for seeds in ([], [1, 1], [-1])),
-        ({"seed": 1, "seeds": [2]}, "seed"),
+        ({"seeds": [1, 1]}, "seeds"),
     ],
 )
 def test_option_that_cannot_be_is_refused_by_its_name(options, name):
@@ -237,14 +172,6 @@ def test_out_folder_that_is_not_empty_is_refused(tmp_path):
     for folder in (tmp_path, tmp_path / "kept" / "run"):
         error = refused(LOSSY, out=folder)
         assert (error.where, error.key) == ("out", str(folder))
-
-
-def test_needs_that_are_no_names_are_refused(tmp_path):
-    for needs in ("None", "(3,)", '"proximity"'):
-        agent = tmp_path / f"odd{len(needs)}.py"
-        agent.write_text(f"{NEEDY}\nclass Odd(Needy):\n    needs = {needs}\n")
-        error = refused(LOSSY, f"robots.flock.agent={agent}:Odd", "robots.flock.params={}")
-        assert error.key == "robots.flock.agent"
 
 
 KINDS = (

@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.base.errors import BadInput, Interrupted
+from swarmwire.comms.base.errors import Interrupted
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, run
@@ -20,6 +20,7 @@ from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.world.backends.pacing import Pace
 from tests.support.clocks import MS, FakeClock, GoingClock
 from tests.support.deploy.runs import LOSSY
+from tests.support.refusals import refused_input
 
 RATE_HZ = 10
 TICK_NS = NS_PER_S // RATE_HZ
@@ -231,28 +232,17 @@ def test_pause_cancels_pending_steps_and_holds_after_the_tick() -> None:
     assert not controls.stands_still
 
 
-def test_speed_request_is_kept_or_refused() -> None:
+def test_speed_that_cannot_be_is_refused() -> None:
     clock, controls, _, _ = controlled()
-    controls.set_speed(4.0)
-    began_ns = []
-    for tick in range(5):
-        controls.wait(tick, never)
-        began_ns.append(clock.time_ns)
-    assert [after - before for before, after in pairwise(began_ns)] == [TICK_NS // 4] * 4
-    controls.set_speed(None)
-    sleeps = len(clock.slept_until)
-    controls.wait(5, never)
-    assert len(clock.slept_until) == sleeps
     for wrong in (0.0, -1.0, 1e9):
-        with pytest.raises(BadInput, match="factor: "):
+        with refused_input(match="factor: "):
             controls.set_speed(wrong)
     assert controls.speed is None
     _, paced, _, _ = controlled(1.0)
-    with pytest.raises(BadInput, match="wall clock"):
+    with refused_input(match="wall clock"):
         paced.set_speed(None)
-    fixed = Controls(clock, RATE_HZ, speed_fixed=True)
-    with pytest.raises(BadInput, match="programs elsewhere"):
-        fixed.set_speed(2.0)
+    with refused_input(match="programs elsewhere"):
+        Controls(clock, RATE_HZ, speed_fixed=True).set_speed(2.0)
 
 
 ASKING = signal.SIGINT, signal.SIGTERM, signal.SIGHUP

@@ -2,7 +2,6 @@
 
 import hashlib
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -165,19 +164,6 @@ def test_failed_compass_reads_blank_until_it_is_repaired():
     assert np.isfinite(heading[1])
     world.set_failed({})
     assert np.isfinite(world.sense(2)["a"].fields["compass.heading_rad"]).all()
-
-
-def event(**keys: Any) -> dict[str, Any]:
-    return {"at_s": 1.0, "do": "fail", "robots": {"group": "flock"}, **keys}
-
-
-@pytest.mark.parametrize(
-    ("table", "key"),
-    [(event(), "part"), (event(part="nose"), "part"), (event(part="motors", per_hour=0.0), "per_hour")],
-)
-def test_impossible_failure_is_refused_with_its_key(table: dict[str, Any], key: str):
-    with refused_input("sample.toml", f"events.0.{key}"):
-        scenario_from(changed("events", [table]), "sample.toml")
 
 
 def notes(*named: tuple[int, str]) -> SparseTable:
