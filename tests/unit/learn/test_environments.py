@@ -16,6 +16,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import Simulation
 from swarmwire.deploy.learn import ArenaState, Choice, Condition, Uniform, parallel_env, vector_env
 from tests.support.agent.policies import FLOCKING as POLICY
+from tests.support.refusals import refused_input
 from tests.unit.learn.scripted_agent import rule
 
 ROOT = Path(__file__).parents[3]
@@ -278,9 +279,8 @@ def test_environment_options_that_cannot_be_are_refused_in_one_line(options: dic
         envs.reset()
         envs.step(envs.action_space.sample())
 
-    with pytest.raises(BadInput, match=words) as refused:
+    with refused_input(match=words):
         used()
-    assert "\n" not in str(refused.value)
 
 
 def test_values_that_were_refused_are_refused_again() -> None:

@@ -22,6 +22,7 @@ from swarmwire.deploy.robots.packages import RobotPlatform, pins
 from swarmwire.deploy.robots.release import release_entries, robot_settings
 from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, result_lines
 from tests.support.deploy.runs import ROOT
+from tests.support.refusals import refused_input
 
 EXAMPLE = ROOT / "examples" / "fleet" / "fleet.toml"
 LEAST: dict[str, Any] = {
@@ -129,9 +130,8 @@ def test_robots_at_one_address_get_consecutive_ports(tmp_path):
     endpoints = [robot.endpoint for robot in read(tmp_path, robots=robots).robots]
     assert endpoints == ["tcp/h:7557", "tcp/h:7558", "tcp/i:7557", "tcp/h:9000"]
     robots["d"]["network_port"] = 7557
-    with pytest.raises(BadInput) as refused:
+    with refused_input(key="robots.d.network_port"):
         read(tmp_path, robots=robots)
-    assert refused.value.key == "robots.d.network_port"
 
 
 def test_connections_join_each_pair_of_robots_once(tmp_path):
@@ -200,18 +200,16 @@ def test_robot_settings_name_files_in_their_own_folder(tmp_path):
     ],
 )
 def test_fleet_file_fault_is_refused_with_its_key(tmp_path, changed, key):
-    with pytest.raises(BadInput, match="^[^\n]*$") as refused:
+    with refused_input(tmp_path / "fleet.toml", key, "^[^\n]*$"):
         read(tmp_path, **changed)
-    assert (refused.value.where, refused.value.key) == (str(tmp_path / "fleet.toml"), key)
 
 
 @pytest.mark.parametrize("text", ["a = ", None])
 def test_fleet_file_that_is_not_toml_or_missing_is_refused(tmp_path, text):
     if text is not None:
         (tmp_path / "fleet.toml").write_text(text)
-    with pytest.raises(BadInput) as refused:
+    with refused_input(tmp_path / "fleet.toml"):
         read_fleet(tmp_path / "fleet.toml")
-    assert refused.value.where == str(tmp_path / "fleet.toml")
 
 
 def test_example_fleet_shows_every_key():
