@@ -232,11 +232,13 @@ class Wide(Breaks):
     any: Any = field(default=None)
 
 
-def install(site: Path, name: str, points: Mapping[str, str], code: str = CODE) -> None:
+def install(
+    site: Path, name: str, points: Mapping[str, str], code: str = CODE, group: str = "swarmwire.metrics"
+) -> None:
     """A package of this name in the folder `site`: a module with `code`, and entry points {name: class within it}."""
     info = site / f"{name}-1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
     lines = [f"{point} = {name}:{of}" for point, of in points.items()]
-    (info / "entry_points.txt").write_text("\n".join(["[swarmwire.metrics]", *lines, ""]))
+    (info / "entry_points.txt").write_text("\n".join([f"[{group}]", *lines, ""]))
     (site / f"{name}.py").write_text(code)

@@ -10,14 +10,11 @@ import pytest
 
 from swarmwire.comms.base.errors import CustomCodeFailed
 from swarmwire.comms.robot.bodies.body import body_from, body_from_mapping, load_body
-from swarmwire.comms.robot.bodies.custom import CustomSensorSpec
 from swarmwire.comms.robot.tick_io import Actions, SparseTable
 from swarmwire.world.custom import Field, Noise
-from swarmwire.world.custom.actuators import custom_actuator
-from swarmwire.world.scenario.bodies import fitted, read_body
+from swarmwire.world.scenario.bodies import fitted
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import scenario_from
-from swarmwire.world.sensors.loading import custom_sensor
 from swarmwire.world.world import World
 from tests.support import custom_code
 from tests.support.refusals import refused_input
@@ -65,17 +62,6 @@ def test_custom_sensor_reads_the_effect_of_a_custom_actuator(tmp_path: Path) -> 
     assert built.sense(1)["a"].fields["paint.amount"].tolist() == [0.0, 1.0, 0.5, 0.0]
     built.move(commanded(built, 0.0, 0.0))
     assert built.sense(2)["a"].fields["paint.amount"].tolist() == [0.0, 1.0, 0.5, 0.0]
-
-
-def test_custom_code_is_constructed_with_its_parameters(tmp_path: Path) -> None:
-    (tmp_path / "mine.toml").write_text(BOTH)
-    body = read_body(tmp_path / "mine.toml", "s.toml", "robots.a.body")
-    paint, painter = body.sensors["paint"], body.actuators["painter"]
-    assert isinstance(paint, CustomSensorSpec)
-    sensor: Any = custom_sensor(paint)
-    assert (type(sensor).__name__, sensor.scale) == ("Paint", 2.0)
-    assert type(custom_actuator(painter)).__name__ == "Painter"
-    assert custom_actuator(painter) is not custom_actuator(painter)
 
 
 def test_custom_code_is_equal_for_an_arena_alone_and_among_others(tmp_path: Path) -> None:
@@ -226,26 +212,9 @@ def test_bad_custom_code_is_refused_with_its_key(tmp_path: Path, key: str, table
         scenario(tmp_path, f'like = "epuck"\n{table}\n')
 
 
-def test_unreadable_body_is_refused(tmp_path: Path) -> None:
-    group = {"body": "none.toml", "count": 1, "agent": "x:X"}
-    tables = {"arena": {"size_m": [4.0, 4.0]}, "robots": {"a": group}}
-    with refused_input(key="robots.a.body", match="none.toml"):
-        scenario_from({"format": 1, "name": "t", "seed": 1, "duration_s": 1.0, **tables}, str(tmp_path / "s.toml"))
-    with refused_input(tmp_path / "mine.toml", ""):
-        scenario(tmp_path, "like = ")
-
-
-def test_need_for_a_missing_custom_sensor_is_refused(tmp_path: Path) -> None:
-    with refused_input(key="robots.a.agent", match="'gas'; the body mine has proximity, .*, paint"):
-        world(tmp_path, needs=("gas",))
-
-
 def test_custom_sensor_of_an_entry_point_is_loaded_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    info = tmp_path / "site" / "mine-1.0.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[swarmwire.sensors]\npainted = painted_code:Paint\n")
-    (tmp_path / "site" / "painted_code.py").write_text(CODE.read_text())
+    points = {"painted": "Paint"}
+    custom_code.install(tmp_path / "site", "painted_code", points, CODE.read_text(), "swarmwire.sensors")
     monkeypatch.syspath_prepend(tmp_path / "site")
     built = world(tmp_path, 'like = "epuck"\n[sensors.mine]\nkind = "painted"\nscale = 3.0\n', needs=("mine",))
     assert built.sense(0)["a"].fields["mine.ticks"].shape == (2, 3)

@@ -21,7 +21,7 @@ from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
-from tests.support.world.scenes import changed, commanded, posed
+from tests.support.world.scenes import changed, posed
 
 TWO = [[-1.0, 0.0, 0.0], [-1.0, 1.0, 0.0]]
 ENGINES = ["discs", "pymunk"]
@@ -132,13 +132,6 @@ def test_events_end_before_others_begin_at_the_same_time():
     assert all(truth.alive[1] for truth in seen)
 
 
-def test_commands_of_dead_robots_do_nothing():
-    world = World(posed(TWO), [1], {})
-    world.set_alive(np.array([False, True]))
-    world.move(commanded(world, 0.1, 0.0))
-    assert world.command.tolist() == [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]
-
-
 def test_run_continues_with_all_robots_dead():
     scenario = posed(TWO)
     world = World(scenario, [1], {})
@@ -185,13 +178,10 @@ def effects(events: list[dict[str, Any]], ticks: int = 20) -> list[Effects]:
     return [scheduler.apply(tick * 10**8, world) for tick in range(ticks)]
 
 
-def test_radio_is_replaced_only_when_a_number_changes():
+def test_radio_and_disruption_are_replaced_only_when_they_change():
     ramp = {"do": "ramp", "at_s": 0.2, "what": "radio.loss", "to": 0.4, "over_s": 0.4, "for_s": 1.0}
     losses = [each.radio.loss for each in effects([ramp]) if each.radio is not None]
     assert losses == pytest.approx([0.1, 0.2, 0.3, 0.4, 0.0])
-
-
-def test_disruption_is_replaced_only_in_a_tick_with_an_event():
     changed = {tick: each.disruption for tick, each in enumerate(effects([at("blackout", 0.2, "a-1", for_s=0.5)]))}
     on = {tick: new.radio_on.tolist() for tick, new in changed.items() if new is not None}
     assert on == {2: [True, False], 7: [True, True]}
@@ -243,18 +233,14 @@ def test_selection_is_drawn_for_each_arena_and_event():
     assert chosen(many, serial=1, count=10)[0] != drawn[0]
 
 
-def test_failures_at_a_rate_are_recorded_at_their_times_with_the_part():
-    event = at("fail", 0.4, "a-0", "a-1", part="motors", per_hour=3000.0, for_s=0.5)
-    seen = truths_of(TWO, [event])
-    events = [(truth, happened) for truth in seen for happened in truth.events]
+def test_failures_are_recorded_at_their_times_at_a_rate_and_else_at_the_scenarios():
+    rate = at("fail", 0.4, "a-0", "a-1", part="motors", per_hour=3000.0, for_s=0.5)
+    events = [(truth, happened) for truth in truths_of(TWO, [rate]) for happened in truth.events]
     assert {happened.words for _, happened in events} == {"fail motors", "fail motors ended"}
     assert all(happened.singly and happened.changed.any() for _, happened in events)
     assert all(happened.at_s == truth.time_ns / 1e9 >= 0.4 for truth, happened in events)
-
-
-def test_failure_without_a_rate_is_recorded_at_its_scenario_time():
-    seen = truths_of(TWO, [at("fail", 0.45, "a-1", part="compass")])
-    events = [happened for truth in seen for happened in truth.events]
+    single = at("fail", 0.45, "a-1", part="compass")
+    events = [happened for truth in truths_of(TWO, [single]) for happened in truth.events]
     assert [(happened.at_s, happened.words, happened.singly) for happened in events] == [(0.45, "fail compass", False)]
 
 
@@ -262,8 +248,7 @@ def pushed(
     poses: Any, engine: str, ticks: int = 20, body: str = "footbot", speed_mps: float = 0.4, **keys: Any
 ) -> Watch:
     """Robots at rest of which an event pushes the first in tick 2."""
-    robots = keys.pop("robots", {"names": ["a-0"]})
-    event = {"do": "impulse", "at_s": 0.2, "robots": robots, "speed_mps": speed_mps, **keys}
+    event = {"do": "impulse", "at_s": 0.2, "robots": {"names": ["a-0"]}, "speed_mps": speed_mps, **keys}
     scenario = posed(poses, body, events=[event], physics={"engine": engine})
     watch = Watch()
     Loop(World(scenario, [1], {}), None, ForwardBackend(0.0), [watch], scenario.events).run(ticks)
@@ -283,15 +268,16 @@ def test_impulse_sets_a_velocity_that_motors_brake(engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_impulses_of_one_tick_add_up(engine):
+def test_impulses_of_one_tick_add_up_for_all_robots_of_a_group(engine):
     events = [
         {"do": "impulse", "at_s": 0.0, "robots": {"group": "a"}, "speed_mps": speed, "direction_rad": direction}
         for speed, direction in ((0.3, 0.0), (0.1, np.pi))
     ]
-    scenario = posed([[0.0, 0.0, 0.0]], "footbot", events=events, physics={"engine": engine})
+    poses = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    scenario = posed(poses, "footbot", events=events, physics={"engine": engine})
     watch = Watch()
     Loop(World(scenario, [1], {}), None, ForwardBackend(0.0), [watch], scenario.events).run(1)
-    assert np.allclose(watch.seen[0].velocity[0], [0.2, 0.0, 0.0])
+    assert np.allclose(watch.seen[0].velocity, [[0.2, 0.0, 0.0]] * 2)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -303,12 +289,6 @@ def test_impulse_at_its_limit_passes_no_wall_and_no_robot(engine):
     seen = pushed([[-1.0, 0.0, 0.0], [-0.8, 0.0, 0.0]], engine, speed_mps=4.25).seen
     assert all(truth.pose[0, 0] < truth.pose[1, 0] for truth in seen)
     assert sum(truth.contact_onsets[0, 0] for truth in seen) >= 1
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_impulse_moves_all_robots_of_a_group(engine):
-    seen = pushed([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], engine, robots={"group": "a"}).seen
-    assert seen[2].velocity[:, 0].tolist() == [0.4, 0.4]
 
 
 def test_impulse_is_equal_for_an_arena_alone_and_among_others():

@@ -38,14 +38,14 @@ SCRIPTS: list[tuple[dict[str, Any], list[set[int]]]] = [
     ({"region": PartitionRegion(radius_m=0.6)}, [{2, 3}, {0, 1, 4, 5}]),
     ({"region": PartitionRegion(at=(1.0, 0.0), size_m=(1.0, 2.0))}, [{4, 5}, {0, 1, 2, 3}]),
 ]
-RADIO_SWARM = Swarm({"a": range(3)}, 3, np.array([7], np.uint64), np.zeros((3, 3)))
-TWO_ARENAS = Swarm({"a": range(3)}, 3, np.array([7, 8], np.uint64), np.zeros((6, 3)))
 KEYS = np.array([7, 8], np.uint64)
 APART = Swarm({"a": range(3)}, 3, KEYS, np.arange(18.0).reshape(6, 3))
 RADIO = Radio(2.0, loss=0.1, bursts=Bursts(), measures=Measures(range=RangeMeasure(0.01)))
-PAIR = Swarm({"a": range(2)}, 2, np.array([7], np.uint64), np.zeros((2, 3)))
 ROBOTS = 2000
-ROBOT_SWARM = Swarm({"a": range(2)}, 2, np.array([7], np.uint64), np.zeros((2, 3)))
+
+
+def swarm(*keys: int, robots: int = ROBOTS) -> Swarm:
+    return Swarm({"a": range(robots)}, robots, np.array(keys, np.uint64), np.zeros((len(keys) * robots, 3)))
 
 
 def partition(**keys: Any) -> Partition:
@@ -143,15 +143,16 @@ def test_partition_region_contains_its_edge():
     assert PartitionRegion(size_m=(2.0, 4.0)).contains(pose).tolist() == [True, False, True, False]
 
 
-def blackout(backlog: str, *names: str) -> Blackout:
-    return Blackout(at_s=0.0, robots=Selection(names=names), backlog=backlog)
+def blackout(*names: str, **backlog: str) -> Blackout:
+    return Blackout(at_s=0.0, robots=Selection(names=names), **backlog)
 
 
 def test_blackout_with_the_strictest_backlog_applies_until_it_ends():
     conditions = ActiveEffects(3)
-    events = [blackout("all", "a-0", "a-1"), blackout("newest", "a-1", "a-2"), blackout("drop", "a-2")]
+    default = blackout("a-2")  # drops
+    events = [blackout("a-0", "a-1", backlog="all"), blackout("a-1", "a-2", backlog="newest"), default]
     for serial, event in enumerate(events):
-        event.begin(serial, RADIO_SWARM, conditions)
+        event.begin(serial, swarm(7, robots=3), conditions)
     assert conditions.disruption().active_backlog.tolist() == [ALL, NEWEST, DROP]
     events[2].end(2, conditions)
     assert conditions.disruption().active_backlog.tolist() == [ALL, NEWEST, NEWEST]
@@ -160,17 +161,13 @@ def test_blackout_with_the_strictest_backlog_applies_until_it_ends():
     assert conditions.radio_on.tolist() == [False, False, True]
 
 
-def test_blackout_drops_packets_by_default():
-    assert Blackout(at_s=0.0, robots=Selection(group="a")).backlog == "drop"
-
-
 def gain(*names: str, **keys: Any) -> Gain:
     return Gain(at_s=0.0, robots=Selection(names=names), for_s=1.0, **keys)
 
 
 def test_gains_of_events_add_up_by_direction_in_every_arena():
     conditions, events = ActiveEffects(6), [gain("a-0", "a-1", send_db=-6.0), gain("a-1", send_db=2.0, receive_db=-3.0)]
-    changed = [event.begin(serial, TWO_ARENAS, conditions).tolist() for serial, event in enumerate(events)]
+    changed = [event.begin(serial, swarm(7, 8, robots=3), conditions).tolist() for serial, event in enumerate(events)]
     assert changed == [[True, True, False] * 2, [False, True, False] * 2]
     now = conditions.disruption()
     assert now.send_gain_db.tolist() == [-6.0, -4.0, 0.0] * 2
@@ -265,7 +262,7 @@ def started_ramps(*ramps: Ramp) -> ActiveEffects:
     conditions = ActiveEffects(2)
     for serial, ramp in enumerate(ramps):
         ramp.check_radio(RADIO)
-        assert ramp.begin(serial, PAIR, conditions).all()
+        assert ramp.begin(serial, swarm(7, robots=2), conditions).all()
     return conditions
 
 
@@ -315,10 +312,6 @@ def test_ramp_to_a_bit_rate_of_a_standard_must_be_a_step():
         ramp("radio.bit_rate_bps", 2_000_000, over_s=1.0).check_radio(WIFI_B)
     with pytest.raises(BadInput, match=r"^to: radio\..*got 3000000 bit/s"):
         ramp("radio.bit_rate_bps", 3_000_000).check_radio(WIFI_B)
-
-
-def swarm(*keys: int, robots: int = ROBOTS) -> Swarm:
-    return Swarm({"a": range(robots)}, robots, np.array(keys, np.uint64), np.zeros((len(keys) * robots, 3)))
 
 
 def fail(part: str, *, per_hour: float | None = None, for_s: float | None = None, **robots: float) -> Fail:
@@ -428,7 +421,7 @@ def test_event_that_is_permanent_or_constant_refuses_end_and_advance() -> None:
     with pytest.raises(TypeError, match="revive is permanent and cannot be undone"):
         revive.end(0, ActiveEffects(2))
     with pytest.raises(TypeError, match="ramp does not change over time"):
-        Ramp(at_s=1.0, what="radio.loss", to=0.5).advance(0, 0, ROBOT_SWARM, ActiveEffects(2))
+        Ramp(at_s=1.0, what="radio.loss", to=0.5).advance(0, 0, swarm(7, robots=2), ActiveEffects(2))
 
 
 @pytest.mark.parametrize(

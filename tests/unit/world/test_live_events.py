@@ -46,11 +46,7 @@ def test_live_events_are_numbered_and_happen_at_the_next_tick():
     ("table", "key"),
     [
         ({}, "do"),
-        ({"do": "burn"}, "do"),
-        ({"do": "kill"}, "robots"),
         ({"do": "kill", "robots": {"names": ["flock-99"]}}, "robots.names"),
-        ({"do": "kill", "robots": {"group": "flok"}}, "robots.group"),
-        ({**KILL, "for_s": -1.0}, "for_s"),
         ({**KILL, "at_s": 3.0}, "at_s"),
         ({**SET, "to": 2.0}, "to"),
         ({"do": "jammer", "at": [0, 0], "power_dbm": 20.0}, "do"),
