@@ -151,8 +151,7 @@ def radio_of(table: dict[str, Any]) -> Radio:
 
 @pytest.mark.parametrize("name", PRESETS)
 def test_radio_preset_has_a_source(name: str) -> None:
-    radio = radio_of({"preset": name})
-    assert radio.preset == name
+    assert radio_of({"preset": name}).preset == name
     assert PRESETS[name].source
 
 
@@ -164,12 +163,24 @@ def test_radio_keys_override_their_preset() -> None:
     assert radio.access_or_default.method == "csma-802154"
 
 
-def test_bursts_from_packet_to_packet_equal_netem_steps() -> None:
-    """The netem command `gemodel 2% 20% 80% 1%` for packets every 100 ms."""
-    steps = {"p": 0.02, "r": 0.2, "loss_bad": 0.8, "loss_good": 0.01, "interval_s": 0.1}
-    scenario, radio = with_radio({"range_m": 2.0, "bursts": steps})
-    assert radio.bursts == bursts_from_steps(0.02, 0.2, 0.8, 0.01, 0.1)
-    assert mapping_of(scenario)["radio"]["bursts"] == steps
+STEPS = {"p": 0.02, "r": 0.2, "loss_bad": 0.8, "loss_good": 0.01, "interval_s": 0.1}
+BURSTS: list[tuple[dict[str, float], Bursts]] = [
+    ({"good_s": 3.0}, Bursts(good_s=3.0)),
+    (STEPS, bursts_from_steps(0.02, 0.2, 0.8, 0.01, 0.1)),  # netem `gemodel 2% 20% 80% 1%`, packets every 100 ms
+    ({"mean_loss": 0.0, "loss_good": 0.0}, Bursts(loss_bad=0.0, loss_good=0.0)),
+    ({"mean_loss": 0.25, "loss_good": 0.25}, Bursts(loss_bad=0.25, loss_good=0.25)),
+]
+
+
+@pytest.mark.parametrize(("table", "bursts"), BURSTS)
+def test_bursts_are_those_of_the_table_which_is_kept(table: dict[str, float], bursts: Bursts) -> None:
+    scenario, radio = with_radio({"range_m": 2.0, "bursts": table})
+    assert radio.bursts is not None
+    if "mean_loss" in table:
+        assert (radio.bursts.loss_bad, radio.bursts.loss) == (bursts.loss_bad, bursts.loss_good)
+    else:
+        assert radio.bursts == bursts
+    assert mapping_of(scenario)["radio"]["bursts"] == table
     in_python = scenario.model_copy(update={"name": "another"})
     assert scenario_from(mapping_of(in_python), "g").radio == radio
 
@@ -178,27 +189,10 @@ def test_bursts_from_packet_to_packet_equal_netem_steps() -> None:
 @pytest.mark.parametrize(("loss_bad", "loss_good"), [(1.0, 0.0), (0.8, 0.05)])
 def test_bursts_have_the_mean_loss_of_the_table(mean: float, loss_bad: float, loss_good: float) -> None:
     table = {"bad_s": 2.0, "mean_loss": mean, "loss_bad": loss_bad, "loss_good": loss_good}
-    scenario, radio = with_radio({"range_m": 2.0, "bursts": table})
-    bursts = radio.bursts
+    bursts = radio_of({"range_m": 2.0, "bursts": table}).bursts
     assert bursts is not None
     assert (bursts.bad_s, bursts.loss_bad, bursts.loss_good) == (2.0, loss_bad, loss_good)
     assert bursts.loss == pytest.approx(mean, rel=1e-12)
-    assert mapping_of(scenario)["radio"]["bursts"] == table
-
-
-@pytest.mark.parametrize("loss_good", [0.0, 0.25])
-def test_bursts_without_extra_loss_keep_the_loss_of_good_links(loss_good: float) -> None:
-    table = {"mean_loss": loss_good, "loss_good": loss_good}
-    scenario, radio = with_radio({"range_m": 2.0, "bursts": table})
-    bursts = radio.bursts
-    assert bursts is not None
-    assert (bursts.loss_bad, bursts.loss) == (loss_good, loss_good)
-    in_python = scenario.model_copy(update={"name": "another"})
-    assert scenario_from(mapping_of(in_python), "g").radio == radio
-
-
-def test_bursts_have_default_lengths() -> None:
-    assert radio_of({"range_m": 2.0, "bursts": {"good_s": 3.0}}).bursts == Bursts(good_s=3.0)
 
 
 def test_radio_model_replaces_the_path_loss_of_the_preset() -> None:

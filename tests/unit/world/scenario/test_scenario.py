@@ -324,27 +324,21 @@ def test_scenario_is_frozen() -> None:
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
-def test_mapping_of_a_scenario_equals_its_file(path):
-    assert mapping_of(load_scenario(path)) == tomllib.loads(path.read_text())
-
-
-def test_mapping_of_a_scenario_has_the_overrides():
-    mapping = mapping_of(load_scenario(LOSSY, ["radio.loss=0.25", "run.on_runner_loss=dead"]))
-    assert mapping["radio"]["loss"] == 0.25
-    assert mapping["run"] == {"on_runner_loss": "dead"}
-
-
-@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
-def test_mapping_of_a_changed_scenario_loads_equal(path):
-    changed = load_scenario(path).model_copy(update={"duration_s": 1.5})
+def test_mapping_of_a_scenario_equals_its_file_and_loads_equal_after_a_change(path):
+    scenario = load_scenario(path)
+    assert mapping_of(scenario) == tomllib.loads(path.read_text())
+    changed = scenario.model_copy(update={"duration_s": 1.5})
     mapping = mapping_of(changed)
     assert mapping["duration_s"] == 1.5
     assert same_content(scenario_from(mapping, str(path)), changed)  # near the pictures that it names
 
 
-def test_mapping_of_a_scenario_is_a_copy():
-    scenario = load_scenario(LOSSY)
-    mapping_of(scenario)["robots"]["flock"]["count"] = 1
+def test_mapping_of_a_scenario_is_a_copy_with_the_overrides():
+    scenario = load_scenario(LOSSY, ["radio.loss=0.25", "run.on_runner_loss=dead"])
+    mapping = mapping_of(scenario)
+    assert mapping["radio"]["loss"] == 0.25
+    assert mapping["run"] == {"on_runner_loss": "dead"}
+    mapping["robots"]["flock"]["count"] = 1
     assert mapping_of(scenario)["robots"]["flock"]["count"] == 20
 
 

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.base.draws import normal, purpose
 from swarmwire.comms.base.geometry.shapes import Boundary, Obstacle
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.observe.truth import Light as Lamp
@@ -84,15 +83,6 @@ def test_camera_lists_the_nearest_blobs_in_order() -> None:
     others = [[d * np.cos(a), d * np.sin(a), 0.0] for a, d in enumerate(apart_m)]
     assert distances(*others, dark=0) == pytest.approx([0.25, 0.375, 0.5, 0.625, 0.725, 0.75])
     assert distances(*others, dark=0, spec=replace(HIGH, max_blobs=3)) == pytest.approx([0.25, 0.375, 0.5])
-
-
-def test_camera_noise_is_a_share_of_the_distance() -> None:
-    poses = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.6, 0.0]]
-    exact = camera_fields(poses, dark=0)
-    noisy = camera_fields(poses, replace(HIGH, noise_relative=0.1), tick=3, dark=0)
-    factor = 1.0 + 0.1 * normal(7, 0, 3, np.arange(2), purpose("camera.distance_m noise"))
-    assert noisy["distance_m"][0, :2] == pytest.approx(exact["distance_m"][0, :2] * factor)
-    assert np.array_equal(noisy["bearing_rad"], exact["bearing_rad"], equal_nan=True)
 
 
 def test_lost_blob_is_lost_in_all_fields() -> None:

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Light
@@ -137,17 +136,6 @@ def test_shadows_equal_a_search_among_all_robots(spread_m: float) -> None:
     assert lit == {True, False}
 
 
-def test_light_noise_is_uniform_keyed_and_clipped() -> None:
-    poses = np.stack([np.linspace(-4, 4, 20), np.zeros(20), np.zeros(20)], axis=1)
-    noisy = sensor(scene(poses, EPUCK), EPUCK)
-    readings = noisy.read(3)["light.value"]
-    draw = uniform(7, np.arange(20)[:, None], 3, np.arange(8), purpose("light.value noise"))
-    assert readings == pytest.approx(np.maximum(0.05 * (2.0 * draw - 1.0), 0.0))
-    assert np.array_equal(readings, noisy.read(3)["light.value"])
-    assert not np.array_equal(readings, noisy.read(4)["light.value"])
-    assert readings.flags.c_contiguous
-
-
 def scanned(poses: Any, spec: ScanSpec, tick: int = 0, **more: Any) -> FloatArray:
     return read(scene(poses, FOOTBOT, **more), FOOTBOT, "scan", spec, tick)["scan.range_m"]
 
@@ -162,15 +150,6 @@ def test_scan_reads_range_min_when_too_near_and_inf_beyond() -> None:
     poses = [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]
     spec = ScanSpec(rays=2, range_m=1.0, range_min_m=0.12)
     assert scanned(poses, spec, boundary="open").tolist() == [[0.12, np.inf], [np.inf, 0.12]]
-
-
-def test_scan_noise_is_normal_keyed_and_grows_with_the_distance() -> None:
-    spec = ScanSpec(rays=8, range_m=3.5, noise_m=0.01, noise_relative=0.02, range_min_m=0.1)
-    exact = scanned([[0.2, 0.1, 0.3]], replace(spec, noise_m=0.0, noise_relative=0.0), size_m=4.0)[0]
-    noisy = scanned([[0.2, 0.1, 0.3]], spec, tick=5, size_m=4.0)[0]
-    error = (0.01 + 0.02 * exact) * normal(7, 0, 5, np.arange(8), purpose("scan.range_m noise"))
-    assert noisy == pytest.approx(exact + error)
-    assert np.all(scanned([[0.0, 0.0, 0.0]], spec, boundary="open") == np.inf)
 
 
 def test_lost_scan_ray_reads_inf() -> None:

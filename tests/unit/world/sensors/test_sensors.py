@@ -10,15 +10,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.base.angles import wrap_angles
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.base.draws import normal, purpose
+from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.base.plugins import NotLoaded
-from swarmwire.comms.observe.truth import Group
+from swarmwire.comms.observe.truth import Group, Light
 from swarmwire.comms.robot.bodies.body import Body, load_body
 from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
-from swarmwire.comms.robot.sensors.rays import ProximitySpec
+from swarmwire.comms.robot.sensors.camera import CameraSpec
+from swarmwire.comms.robot.sensors.imu import ImuSpec
+from swarmwire.comms.robot.sensors.light import LightSpec
+from swarmwire.comms.robot.sensors.rays import InfraredSpec, ProximitySpec
+from swarmwire.comms.robot.sensors.scan import ScanSpec
 from swarmwire.comms.robot.sensors.sensor import RangedSensorSpec, SensorSpec
-from swarmwire.comms.robot.sensors.simple import CompassSpec, OdometrySpec
+from swarmwire.comms.robot.sensors.simple import (
+    BatterySpec,
+    CompassSpec,
+    FlowSpec,
+    GroundSpec,
+    OdometrySpec,
+    PositioningSpec,
+)
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.sensors.loading import sensor_of, truth_of
 from swarmwire.world.sensors.rays import ProximitySensor
@@ -40,6 +52,8 @@ ARGOS_WALL = [
     (0.01, 0.1448),
     (0.005, 0.1755),
 ]
+assert FOOTBOT.proximity is not None
+RING: dict[str, Any] = {"angles_deg": tuple(range(0, 360, 30)), "range_m": 0.1, "response": FOOTBOT.proximity.response}
 STAGES: dict[str, Any] = {"rate_hz": 4.0, "delay_s": 0.15, "drop_out": 0.2}
 OUTLIER: dict[str, Any] = {"outlier": 0.1, "step": 0.01}
 SPECS = {
@@ -110,30 +124,50 @@ def test_proximity_kernel_equals_the_curve_of_the_sheet(body: Body) -> None:
     assert not value[~seen].any()
 
 
-def test_proximity_noise_is_uniform_keyed_and_clipped() -> None:
-    poses = np.stack([np.linspace(-4, 4, 500), np.zeros(500), np.zeros(500)], axis=1)
-    assert EPUCK.proximity is not None
-    spec = replace(EPUCK.proximity, noise=0.05)
-    sensor = staged(scene(poses[::25], EPUCK, boundary="open"), EPUCK, "proximity", spec)
-    draws = np.concatenate([sensor.read(tick)["proximity.value"].ravel() for tick in range(50)])
-    assert draws.min() == 0.0
-    assert 0.0499 < draws.max() <= 0.05
-    # 8,000 draws, half of them clipped to 0: the share's standard deviation is 0.0056.
-    assert abs(np.mean(draws == 0.0) - 0.5) < 0.025
-    assert np.array_equal(sensor.read(3)["proximity.value"], sensor.read(3)["proximity.value"])
-    assert not np.array_equal(sensor.read(3)["proximity.value"], sensor.read(4)["proximity.value"])
+# Of each sensor: a spec with noise, its distribution, and its sizes by field, absolute and as a share of the value.
+NOISE: dict[str, tuple[SensorSpec, Any, dict[str, tuple[float, float]]]] = {
+    "proximity": (ProximitySpec(**RING, noise=0.05), uniform, {"value": (0.05, 0.0)}),
+    "infrared": (InfraredSpec(**RING, noise=0.05), uniform, {"value": (0.05, 0.0)}),
+    "light": (LightSpec(angles_deg=RING["angles_deg"], noise=0.05), uniform, {"value": (0.05, 0.0)}),
+    "ground": (GroundSpec(points_m=((0.03, 0.0), (0.0, 0.03)), noise=0.3), uniform, {"shade": (0.3, 0.0)}),
+    "compass": (CompassSpec(0.1), normal, {"heading_rad": (0.1, 0.0)}),
+    "positioning": (PositioningSpec(0.1), normal, {"x_m": (0.1, 0.0), "y_m": (0.1, 0.0)}),
+    "flow": (FlowSpec(noise_mps=0.1), normal, {"forward_mps": (0.1, 0.0), "left_mps": (0.1, 0.0)}),
+    "battery": (
+        BatterySpec(capacity_wh=1.0, noise=0.2, noise_v=0.1),
+        normal,
+        {"charge": (0.2, 0.0), "voltage_v": (0.1, 0.0)},
+    ),
+    "imu": (
+        ImuSpec(noise_mps2=0.1, noise_radps=0.2),
+        normal,
+        {"forward_mps2": (0.1, 0.0), "left_mps2": (0.1, 0.0), "turn_radps": (0.2, 0.0)},
+    ),
+    "scan": (ScanSpec(rays=8, range_m=3.5, noise_m=0.01, noise_relative=0.02), normal, {"range_m": (0.01, 0.02)}),
+    "camera": (CameraSpec(height_m=0.2887, aperture_deg=70.0, noise_relative=0.1), normal, {"distance_m": (0.0, 0.1)}),
+}
 
 
-def test_compass_noise_is_normal_and_stays_within_a_turn() -> None:
-    poses = np.tile([0.0, 0.0, np.pi], (20, 1))
-    looked_at = scene(poses, EPUCK)
-    exact = read(looked_at, EPUCK, "compass", CompassSpec(0.0))["compass.heading_rad"]
-    assert np.array_equal(exact, np.full(20, np.pi))
-    noisy = read(looked_at, EPUCK, "compass", CompassSpec(0.1), 5)["compass.heading_rad"]
-    error = np.angle(np.exp(1j * (noisy - np.pi)))
-    expected = 0.1 * normal(7, np.arange(20), 5, 0, purpose("compass.heading_rad noise"))
-    assert np.allclose(error, expected)
-    assert np.all((noisy > -np.pi) & (noisy <= np.pi))
+@pytest.mark.parametrize("name", NOISE)
+def test_noise_of_a_sensor_is_keyed_and_clipped_to_its_range(name: str) -> None:
+    spec, distribution, sizes = NOISE[name]
+    exact_spec = replace(spec, **dict.fromkeys((key for key in asdict(spec) if key.startswith("noise")), 0.0))
+    poses = np.random.default_rng(1).uniform(-1, 1, (20, 3)) * [0.3, 0.3, np.pi]
+    looked_at = scene(poses, FOOTBOT, size_m=4.0, lights=(Light(1.0, 0.0, 2.0),), colour=0x00FF00)
+    exact, noisy, later = (read(looked_at, FOOTBOT, name, *of) for of in ((exact_spec, 4), (spec, 4), (spec, 5)))
+    for field, (size, relative) in sizes.items():
+        column = f"{name}.{field}"
+        width = exact[column].shape[1:]
+        robots, slots = (np.arange(20)[:, None], np.arange(*width)) if width else (np.arange(20), 0)
+        draws = distribution(7, robots, 4, slots, purpose(f"{column} noise"))
+        error = 2.0 * draws - 1.0 if distribution is uniform else draws
+        expected = exact[column] + (size + relative * exact[column]) * error
+        if distribution is uniform or field in ("charge", "range_m"):
+            expected = np.clip(expected, 0.0, 3.5 if name == "scan" else 1.0)
+        expected = wrap_angles(expected) if name == "compass" else expected
+        np.testing.assert_allclose(noisy[column], expected, rtol=1e-12, atol=1e-12)
+        assert np.isfinite(exact[column]).any()
+        assert not np.array_equal(noisy[column], later[column], equal_nan=True)
 
 
 @given(turns=st.integers(-5, 5), heading=st.floats(-3.14, 3.14))
