@@ -1,6 +1,7 @@
 """What `list` and `describe` know: every entry of every registry, found by its name and printed with all it takes."""
 
 import json
+import re
 from dataclasses import MISSING, fields, is_dataclass
 from io import StringIO
 from typing import Any, get_args, get_type_hints
@@ -12,7 +13,6 @@ from swarmwire.agent import behaviours
 from swarmwire.agent.parameters import REQUIRED, parameters_of
 from swarmwire.agent.step_context import TX_STATUS
 from swarmwire.comms.base.config import bounds_of
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.impairments import Measures
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.stages.chain import ORDER
@@ -30,6 +30,7 @@ from swarmwire.world.scenario.schema import written_form
 from swarmwire.world.scenario_file import scenario_schema
 from tests.support.custom_code import install
 from tests.support.deploy.runs import LOSSY, ROOT, called
+from tests.support.refusals import refused_input
 
 EVENTS = {next(of.default for of in fields(kind) if of.name == "do"): kind for kind in ACTIONS}
 OF_EACH_KIND = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
@@ -223,11 +224,8 @@ def test_entry_is_found_by_a_short_name_or_the_users_group_name(asked, name):
     ],
 )
 def test_unknown_or_ambiguous_name_is_refused_with_what_to_try(asked, expected):
-    with pytest.raises(BadInput) as refused:
+    with refused_input(asked, match=re.escape(expected)):
         find(asked)
-    assert str(refused.value).startswith(f"{asked}: ")
-    assert expected in str(refused.value)
-    assert "\n" not in str(refused.value)
 
 
 def test_bodies_and_agents_of_a_user_are_described_as_shipped_ones(tmp_path, monkeypatch):
@@ -261,14 +259,10 @@ def test_metrics_of_packages_are_listed_and_described_also_if_they_do_not_import
     assert called(monkeypatch, capsys, "describe", "west")[0] == 0
 
 
-def test_commands_list_and_describe_print_entries_and_refusals(monkeypatch, capsys):
+def test_commands_list_and_describe_print_entries(monkeypatch, capsys):
     code, out, errors = called(monkeypatch, capsys, "list")
     assert (code, errors) == (0, "")
     assert all(f"{kind.name} " in out for kind in KINDS)
     assert "probability that a packet" in called(monkeypatch, capsys, "describe", "radio.loss")[1]
-    for command, name in (("list", "nothing"), ("describe", "flokking")):
-        code, out, errors = called(monkeypatch, capsys, command, name)
-        assert (code, out, errors.count("\n")) == (2, "", 1)
-        assert errors.startswith(f"error: {name}: ")
     for name in ("list", "describe", "new"):
         assert f" swarmwire {name} " in called(monkeypatch, capsys, name, "--help")[1]

@@ -56,16 +56,6 @@ def test_holonomic_body_moves_sideways_in_its_frame(monkeypatch: pytest.MonkeyPa
     np.testing.assert_allclose([x_m, y_m], 0.8 * left, atol=0.01)  # minus the time to reach its speed
 
 
-def test_holonomic_body_that_turns_circles_at_constant_speed(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = driven(monkeypatch, HOLONOMIC, [0.0, 0.0, 0.0])
-    speeds: list[float] = []
-    for _ in range(40):
-        after(world, 0.1, 0.1, 1.5, 0.1)
-        speeds.append(float(np.hypot(*world.velocity[0, :2])))
-    np.testing.assert_allclose(speeds[10:], np.hypot(0.1, 0.1), rtol=0.02)
-    assert world.velocity[0, 2] == pytest.approx(1.5, rel=1e-3)
-
-
 def test_twist_drive_turns_and_drives_at_both_limits_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     world = driven(monkeypatch, TWIST, [0.0, 0.0, 0.0])
     after(world, 2.0, 9.0, 9.0)
@@ -73,15 +63,6 @@ def test_twist_drive_turns_and_drives_at_both_limits_at_once(monkeypatch: pytest
     assert np.hypot(*world.velocity[0, :2]) == pytest.approx(0.1, rel=0.02)
     assert world.velocity[0, 2] == pytest.approx(2.0, rel=1e-3)
     assert world.counts()["clipped_commands"].tolist() == [20]
-
-
-def test_wheel_noise_bends_the_path_and_is_repeatable(monkeypatch: pytest.MonkeyPatch) -> None:
-    wheels = {"wheel_base_m": 0.053, "max_wheel_mps": 0.1287, **FORCES, "noise": {"factor_std": 0.2}}
-    noisy_pose, again = (after(driven(monkeypatch, wheels, [0.0, 0.0, 0.0]), 2.0, 0.1, 0.0) for _ in range(2))
-    assert noisy_pose.tolist() == again.tolist()
-    assert abs(noisy_pose[2]) > 1e-3
-    straight = after(driven(monkeypatch, {**wheels, "noise": {}}, [0.0, 0.0, 0.0]), 2.0, 0.1, 0.0)
-    assert straight[2] == pytest.approx(0.0, abs=1e-9)
 
 
 def group(kind: str, start: int = 0, robots: int = 1) -> Group:

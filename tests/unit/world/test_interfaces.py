@@ -17,11 +17,9 @@ from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPack
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
 from swarmwire.world.interfaces.backend import INTERFACE_LOST, MAX_READS, FramePorts, InterfacesBackend
-from swarmwire.world.scenario_file import load_scenario
 from tests.support.clocks import MS, FakeClock
 from tests.support.refusals import refused_input
 
-EXAMPLE = Path(__file__).parents[3] / "examples" / "interfaces" / "mesh.toml"
 ROBOTS = 3
 IPV4 = b"\x08\x00"
 ETHERNET_BROADCAST = b"\xff" * 6
@@ -281,11 +279,3 @@ def test_routes_are_restored_where_links_change(rig):
     device.changes.sendto(b"change", device.changes.getsockname())
     assert not len(rig.pop_sent())
     assert [each.restored for each in rig.devices] == [0, 0, 1]
-
-
-def test_mesh_example_has_addresses_and_a_program():
-    scenario = load_scenario(EXAMPLE, [])
-    assert scenario.radio is not None
-    assert scenario.radio.interface is not None
-    assert len(addresses_of(scenario.radio.interface, len(scenario.robot_names()), scenario.radio.mtu_bytes, "")) == 10
-    assert "babeld" in scenario.robots["mesh"].program[-1]

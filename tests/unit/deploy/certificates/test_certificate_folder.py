@@ -28,7 +28,7 @@ from tests.support.refusals import refused_input
 
 
 def refusal(folder: Path, clock: DatedFakeClock, *names: str) -> str:
-    """What is said when these are asked for, which changes nothing."""
+    """The message when these are requested, which changes nothing."""
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     with pytest.raises(BadInput) as refused:
         issued(folder, clock, *names)
@@ -257,17 +257,11 @@ def test_certificate_is_selected_by_name_or_by_a_unique_purpose(registered):
         network_in(registered, "runner", "nobody")
 
 
-def test_network_of_a_machine_with_one_certificate_needs_no_register(registered, tmp_path):
-    copy = tmp_path / "own"
-    copy.mkdir()
-    with refused_input(copy):
-        network_in(copy, "runner")
-    for name in ("ca.pem", "laptop-1.pem", "laptop-1.key"):
-        (copy / name).write_bytes((registered / name).read_bytes())
-    (copy / "laptop-1.key").chmod(0o600)
-    assert network_in(copy, "runner").certificate == copy / "laptop-1.pem"
-    with pytest.raises(BadInput):
-        access_in(copy)
+def test_folder_without_anything_has_no_network_and_no_rights(tmp_path):
+    with refused_input(tmp_path):
+        network_in(tmp_path, "runner")
+    with refused_input(tmp_path):
+        access_in(tmp_path)
 
 
 def test_unknown_purpose_is_refused():

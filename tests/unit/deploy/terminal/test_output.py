@@ -30,19 +30,17 @@ def in_a_table(text):
     return table
 
 
-@pytest.mark.parametrize("shown", [str, Text, Panel, in_a_table])
+@pytest.mark.parametrize("shown", [str, Text, Panel, in_a_table, None])
 def test_escapes_in_names_are_shown_as_text_by_the_console(shown):
-    out = StringIO()
-    TerminalConsole(file=out, width=80, force_terminal=True, color_system=None).print(shown(EVIL))
-    assert HARMLESS in out.getvalue()
-    assert "\x1b" not in out.getvalue()
-
-
-def test_escapes_in_names_are_shown_as_text_by_a_live_panel():
+    """Also in a live panel, None."""
     out = StringIO()
     console = TerminalConsole(file=out, width=80, force_terminal=True, color_system=None)
-    with Live(Panel(EVIL), console=console):
-        pass
+    if shown:
+        console.print(shown(EVIL))
+        assert "\x1b" not in out.getvalue()
+    else:
+        with Live(Panel(EVIL), console=console):
+            pass
     assert HARMLESS in out.getvalue()
     assert "\u202e" not in out.getvalue()
 

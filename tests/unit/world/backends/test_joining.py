@@ -183,15 +183,6 @@ def test_allocation_accepts_only_the_moves_of_its_table(state, move) -> None:
         assert vars(allocation) == before
 
 
-def test_allocation_states_are_all_reachable() -> None:
-    assert set(MOVES) == set(STATES)
-    reached = set(STATES[:1])
-    while more := {to for state in reached for to in MOVES[state].values()} - reached:
-        reached |= more
-    assert reached == set(STATES)
-    assert {move for moves in MOVES.values() for move in moves} == set(EVERY_MOVE)
-
-
 @pytest.fixture
 def session(tmp_path) -> Generator[zenoh.Session]:
     with closed_after(open_world(unix_endpoint(f"{tmp_path}/w"), 10.0)) as session:

@@ -1,5 +1,6 @@
 """Runs in real time."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, SparseTable
@@ -32,9 +32,11 @@ def join(runners: RealTime, name: str) -> None:
     runners.answer(name, frames.encode("ready", -1, {}))
 
 
-def playing(on_loss: OnLoss = "stop", timeout_s: float = 30.0) -> RealTime:
-    runners = RealTime([assignment(group("unused:A", rows)) for rows in ROWS_OF.values()], 0.5, timeout_s, on_loss)
-    for name in ROWS_OF:
+def playing(on_loss: OnLoss = "stop", timeout_s: float = 30.0, names: str = "ab", **options: bool) -> RealTime:
+    """Runners that have joined, of which each has two robots."""
+    parts = [assignment(group("unused:A", rows)) for rows in ROWS_OF.values()]
+    runners = RealTime(parts, 0.5, timeout_s, on_loss, **options)
+    for name in names:
         join(runners, name)
     return runners
 
@@ -52,6 +54,16 @@ def answer_of(runner: str, tick: int, speed: float, drive: bool = True) -> bytes
     return encode_actions(
         tick, Actions(rows, np.full(n, drive), np.full(n, speed), np.full(n, -speed), np.zeros(n), sent)
     )
+
+
+def answer_with(tick: int, rows: Sequence[int], **tables: SparseTable) -> bytes:
+    """An answer of robots that command nothing, with LEDs, values, …"""
+    still = np.zeros(len(rows))
+    return encode_actions(tick, Actions(np.array(rows, np.int64), still.astype(bool), still, still, still, **tables))
+
+
+def table(rows: Sequence[int], slots: Sequence[int], values: Sequence[float]) -> SparseTable:
+    return SparseTable(np.array(rows, np.int64), np.array(slots, np.int64), np.array(values))
 
 
 def pop(runners: RealTime) -> tuple[dict[int, float], list[int]]:
@@ -111,42 +123,26 @@ def test_newer_of_two_answers_commands_and_both_send() -> None:
 def test_answer_with_repeated_or_foreign_robots_is_malformed(rows: list[int]) -> None:
     runners = playing()
     open_tick(runners, 0)
-    zeros = np.zeros(len(rows))
-    runners.answer("a", encode_actions(0, Actions(np.array(rows), zeros.astype(bool), zeros, zeros, zeros)))
+    runners.answer("a", answer_with(0, rows))
     assert runners.counts() == {"malformed_frames": 1}
     runners.answer("a", answer_of("a", 0, 1.0))
     assert pop(runners)[0] == {0: 1.0, 2: 1.0}
 
 
-def test_leds_of_two_answers_are_merged_and_the_newer_colour_wins() -> None:
+def test_leds_and_noted_values_of_two_answers_are_merged_in_their_order() -> None:
     runners = playing()
     open_tick(runners, 0)
     open_tick(runners, 1)
-    for tick, (changed, slot, rgb) in enumerate((([0, 2], [3, 3], [7.0, 8.0]), ([2, 2], [3, 4], [9.0, 10.0]))):
-        rows = np.array(ROWS_OF["a"], np.int64)
-        still = np.zeros(len(rows))
-        leds = SparseTable(np.array(changed), np.array(slot), np.array(rgb))
-        actions = Actions(rows, still.astype(bool), still, still, still, leds=leds)
-        runners.answer("a", encode_actions(tick, actions))
-    got = runners.pop_actions().leds
-    assert (got.rows.tolist(), got.slot.tolist(), got.value.tolist()) == ([0, 2, 2, 2], [3, 3, 3, 4], [7, 8, 9, 10])
-    assert len(runners.pop_actions().leds) == 0
-
-
-def test_noted_values_of_two_answers_keep_their_order() -> None:
-    runners = playing()
-    open_tick(runners, 0)
-    open_tick(runners, 1)
-    rows = np.array(ROWS_OF["a"], np.int64)
-    still = np.zeros(len(rows))
-    slot = np.zeros_like(rows)
-    tables = SparseTable(rows, slot, still + 0.5), SparseTable(rows[1:], slot[1:], still[1:] + 0.75)
-    for tick, table in enumerate(tables):
-        actions = Actions(rows, still.astype(bool), still, still, still, values=table)
-        runners.answer("a", encode_actions(tick, actions))
-    got = runners.pop_actions().values
-    assert (got.rows.tolist(), got.value.tolist()) == ([*ROWS_OF["a"], *ROWS_OF["a"][1:]], [0.5, 0.5, 0.75])
-    assert len(runners.pop_actions().values) == 0
+    leds = table([0, 2], [3, 3], [7.0, 8.0]), table([2, 2], [3, 4], [9.0, 10.0])
+    values = table([0, 2], [0, 0], [0.5, 0.5]), table([2], [0], [0.75])
+    for tick in range(2):
+        runners.answer("a", answer_with(tick, [0, 2], leds=leds[tick], values=values[tick]))
+    got = runners.pop_actions()
+    rows, slots = got.leds.rows.tolist(), got.leds.slot.tolist()
+    assert (rows, slots, got.leds.value.tolist()) == ([0, 2, 2, 2], [3, 3, 3, 4], [7, 8, 9, 10])
+    assert (got.values.rows.tolist(), got.values.value.tolist()) == ([0, 2, 2], [0.5, 0.5, 0.75])
+    later = runners.pop_actions()
+    assert len(later.leds) == len(later.values) == 0
 
 
 def test_lateral_speed_is_commanded_and_stopped_like_the_others() -> None:
@@ -233,19 +229,6 @@ def test_watchdog_does_not_stop_a_robot_that_acts_seldom() -> None:
     assert runners.watchdog_stops.tolist() == [0, 1, 0, 1]
 
 
-def test_lost_runner_ends_the_run_on_stop() -> None:
-    runners = playing("stop")
-    open_tick(runners, 0)
-    with pytest.raises(RunnerLost, match="its link is gone"):
-        runners.lose("a", "its link is gone")
-
-
-@pytest.mark.parametrize("on_loss", ["stop", "dead", "wait"])
-def test_loss_before_the_first_tick_ends_the_run(on_loss: OnLoss) -> None:
-    with pytest.raises(RunnerLost):
-        playing(on_loss).lose("a", "its link is gone")
-
-
 def test_robots_of_a_dead_runner_stand_still_to_the_end() -> None:
     runners = playing("dead")
     open_tick(runners, 0)
@@ -319,11 +302,7 @@ def test_pause_counts_neither_for_time_outs_nor_watchdogs() -> None:
 
 
 def in_subticks() -> RealTime:
-    parts = [assignment(group("unused:A", rows)) for rows in ROWS_OF.values()]
-    runners = RealTime(parts, 0.5, 30.0, "dead", subtick=True)
-    for name in ROWS_OF:
-        join(runners, name)
-    return runners
+    return playing("dead", subtick=True)
 
 
 def broadcasts(*senders: int) -> SentPackets:
@@ -347,10 +326,7 @@ def test_subtick_frames_go_to_every_ready_runner_with_rising_numbers() -> None:
 
 
 def test_subtick_packets_of_robots_without_a_runner_are_dropped() -> None:
-    runners = RealTime(
-        [assignment(group("unused:A", rows)) for rows in ROWS_OF.values()], 0.5, 30.0, "wait", subtick=True
-    )
-    join(runners, "a")
+    runners = playing("wait", names="a", subtick=True)
     assert [name for name, _ in runners.deliver(0, 0, received_from(broadcasts(0), [1, 2, 3]), NO_TX_STATUSES)] == ["a"]
     assert runners.packets_dropped == 2
 

@@ -67,9 +67,9 @@ def standing(got: Actions) -> list[int]:
     return sorted(got.rows[still & (got.rows > 0)].tolist())  # robot 0 of `actions` stands anyway
 
 
-def answer_with_memory(tick: int, **memory: dict[int, int]) -> bytes:
-    """An answer of the robots in the memory, by group: rows and numbers."""
-    rows = [row for group in memory.values() for row in group]
+def answer_with_memory(tick: int, rows: list[int] | None = None, **memory: dict[int, int]) -> bytes:
+    """An answer of these robots, or of those in the memory, by group: rows and numbers."""
+    rows = [row for group in memory.values() for row in group] if rows is None else rows
     memories = {
         name: GroupMemory(np.array(list(group), np.int64), {"x": np.array(list(group.values()), np.int64)})
         for name, group in memory.items()
@@ -248,11 +248,7 @@ def test_memory_of_foreign_robots_makes_the_answer_malformed(memory: dict[str, d
     roster = lockstep("stand")
     join(roster, "a", "flock-0", "flock-1")
     open_tick(roster, 0)
-    memories = {
-        name: GroupMemory(np.array(list(group), np.int64), {"x": np.array(list(group.values()), np.int64)})
-        for name, group in memory.items()
-    }
-    roster.answer("a", encode_actions(0, actions([0, 1]), memory=memories))
+    roster.answer("a", answer_with_memory(0, [0, 1], **memory))
     assert roster.counts() == {"malformed_frames": 1}
     assert roster.waiting == 1
 

@@ -24,21 +24,6 @@ WEDGE = {"shape": "polygon", "points": [[0.0, 0.0], [0.4, 0.0], [0.0, 0.3]], "he
 SHAPES = [CYLINDER, BOX, WEDGE]
 
 
-def test_polygon_with_the_corners_of_a_box_moves_robots_like_the_box() -> None:
-    square = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.3], [-0.3, 0.3]]
-    worlds = [
-        World(posed([[-0.5, 0.1, 0.1]], arena={"size_m": [4.0, 4.0], "obstacles": [shape]}), [1], {})
-        for shape in (
-            {"shape": "box", "size_m": [0.6, 0.6], "heading_rad": 0.2, "at": [0.0, 0.0]},
-            {"shape": "polygon", "points": square, "heading_rad": 0.2, "at": [0.0, 0.0]},
-        )
-    ]
-    for _ in range(60):
-        onsets = [world.move(commanded(world, 0.12, 0.0)) for world in worlds]
-        assert np.array_equal(*onsets)
-        assert np.array_equal(worlds[0].pose, worlds[1].pose)
-
-
 def test_open_arena_lets_robots_leave() -> None:
     world = World(posed([[1.9, 0.0, 0.0]], arena={"size_m": [4.0, 4.0], "boundary": "open"}), [1], {})
     for _ in range(40):
@@ -52,15 +37,6 @@ def test_speed_builds_up_with_the_force_of_the_motors() -> None:
     # At 1.5 N on 0.4 kg it takes 34 ms to full speed; until then half of the way is lost, and the first step of 2 ms.
     lost_s = 0.5 * EPUCK.max_linear_mps * EPUCK.mass_kg / EPUCK.drive.max_force_n
     assert world.pose[0, 0] == pytest.approx(EPUCK.max_linear_mps * (0.1 - lost_s), abs=0.002 * EPUCK.max_linear_mps)
-
-
-@pytest.mark.parametrize("steps", [3, 10])
-@pytest.mark.parametrize("offset_m", [0.0, 0.02, 0.05, 0.07, 0.08])
-def test_contact_is_counted_once_however_long_it_lasts(steps: int, offset_m: float) -> None:
-    """Foot-bots that push and slide along each other lose touch by micrometres."""
-    poses = [[-0.3, offset_m, 0.0], [0.3, -offset_m, np.pi]]
-    world = World(posed(poses, "footbot", physics={"steps": steps}), [1], {})
-    assert np.array_equal(sum(world.move(commanded(world, 0.2, 0.0)) for _ in range(30)), [[1, 0]])
 
 
 def test_contact_is_counted_again_after_robots_parted() -> None:
