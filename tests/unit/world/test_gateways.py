@@ -26,6 +26,7 @@ from tests.support.agent.hosts import SILENCE, received_from
 from tests.support.clocks import FakeClock
 from tests.support.refusals import refused_input
 from tests.support.world.gateways import ScriptedGateway, ScriptedOptions
+from tests.support.world.mediums import ScriptedMedium
 
 TICK_NS = NS_PER_S // 10
 SCRIPTED = "tests.support.world.gateways:ScriptedGateway"
@@ -231,28 +232,8 @@ def test_gateway_backend_starts_and_closes_the_inner_backend() -> None:
     assert rig.inner.calls == ["started", "closed"]
 
 
-class QuietAir:
-    """A medium of the loop from which robots 0 and 3 receive one packet in the middle of the tick."""
-
-    def __init__(self) -> None:
-        self.sent: list[tuple[int | None, bytes]] = []
-        self.delivered = False
-
-    def send(self, packets) -> None:
-        if len(packets.sent):
-            self.sent.append((packets.tick, packets.sent.payloads.row(0)))
-
-    def advance(self, until_ns) -> tuple[ReceivedPackets, TxStatuses]:
-        due, self.delivered = (
-            not self.delivered and until_ns >= TICK_NS // 2,
-            self.delivered or until_ns >= TICK_NS // 2,
-        )
-        sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.from_rows([b"beacon"]))
-        return received_from(sent, [0, 3] if due else []), NO_TX_STATUSES
-
-
 def test_gateway_robots_receive_and_send_within_subticks() -> None:
-    rig, medium = Rig(subtick_s=0.010), QuietAir()
+    rig, medium = Rig(subtick_s=0.010), ScriptedMedium([TICK_NS // 2], b"beacon", 1, (0, 3))
     rows = np.array([2, 3, 4])
     fields = {"proximity.value": np.zeros((3, 8)), "odometry.left_m": np.zeros(3)}
     sensors = {"a": GroupReadings(np.array([0, 1]), {}), "b": GroupReadings(rows, fields)}
@@ -262,9 +243,9 @@ def test_gateway_robots_receive_and_send_within_subticks() -> None:
     received = [packets.receiver.tolist() for _, packets, _ in rig.medium.published if len(packets)]
     assert received == [[3]]
     assert [call[1].receiver.tolist() for call in rig.inner.calls if call[0] == "received"] == [[], [0, 3]]
-    assert medium.sent[:2] == [(0, b"inner"), (None, b"outer")]
-    assert (None, b"echo") in medium.sent
-    assert set(medium.sent[2:]) == {(None, b"outer"), (None, b"echo")}
+    sent = [(packets.tick, packets.sent.payloads.row(0)) for packets in medium.sent]
+    assert sent[:2] == [(0, b"inner"), (None, b"outer")]
+    assert set(sent[2:]) == {(None, b"outer"), (None, b"echo")}
     assert not len(actions.sent)
     assert commands(actions)[3] == (0.05, -0.7)
     assert rig.backend.report().subtick_s == 0.010

@@ -4,7 +4,6 @@ import socket
 from collections.abc import Callable, Generator
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,12 +12,13 @@ from swarmwire.comms.base.ethernet import FRAME_TAG, LATE_S, exchanged, station
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
-from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
 from swarmwire.world.interfaces.backend import INTERFACE_LOST, MAX_READS, FramePorts, InterfacesBackend
 from tests.support.clocks import MS, FakeClock
 from tests.support.refusals import refused_input
+from tests.support.world.mediums import ScriptedMedium
 
 ROBOTS = 3
 IPV4 = b"\x08\x00"
@@ -199,19 +199,6 @@ def test_late_deliveries_are_counted(rig):
     assert report.delivery.worst_s == pytest.approx(LATE_S, rel=0.01)
 
 
-class Medium:
-    """A medium that collects sent packets and delivers none."""
-
-    def __init__(self) -> None:
-        self.sent: list[tuple[int, list[int]]] = []
-
-    def send(self, packets: SubtickPackets) -> None:
-        self.sent.append((packets.at_ns, packets.sent.sender.tolist()))
-
-    def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        return ReceivedPackets.none(), NO_TX_STATUSES
-
-
 class TickingBackend:
     """A backend whose tick is a list of calls on its medium."""
 
@@ -232,13 +219,13 @@ def test_frames_of_several_robots_are_sent_at_different_times(rig):
             rig.send(robot, ETHERNET_BROADCAST)
         medium.advance(10 * MS)
 
-    medium = Medium()
+    medium = ScriptedMedium()
     ticking = TickingBackend([first, lambda medium: medium.advance(11 * MS), lambda medium: medium.advance(12 * MS)])
     InterfacesBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
-    times_ns = [at_ns for at_ns, _ in medium.sent]
+    times_ns = [packets.at_ns for packets in medium.sent]
     assert times_ns == sorted(set(times_ns))
     assert 10 * MS < times_ns[0] < times_ns[-1] < 11 * MS
-    assert sorted(senders for _, senders in medium.sent) == [[0, 0], [1], [2]]
+    assert sorted(packets.sent.sender.tolist() for packets in medium.sent) == [[0, 0], [1], [2]]
     assert rig.ports.report().sent == 4
 
 
@@ -248,11 +235,12 @@ def test_frames_of_a_single_robot_are_sent_at_once_in_order(rig):
             rig.send(0, station(to))
         medium.advance(10 * MS)
 
-    medium = Medium()
+    medium = ScriptedMedium()
     message = SubtickPackets(10 * MS + 5, 3, SentPackets(np.array([1]), np.array([0]), Payloads.from_rows([b"\1\0"])))
     ticking = TickingBackend([first, lambda medium: medium.send(message), lambda medium: medium.advance(11 * MS)])
     InterfacesBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
-    assert medium.sent == [(10 * MS, [0, 0, 0]), (10 * MS + 5, [1])]
+    sent = [(packets.at_ns, packets.sent.sender.tolist()) for packets in medium.sent]
+    assert sent == [(10 * MS, [0, 0, 0]), (10 * MS + 5, [1])]
 
 
 def test_frame_that_a_device_refuses_is_counted(rig):

@@ -30,6 +30,7 @@ from tests.support.agent.hosts import MEASURES, assignment, group, one_group, sp
 from tests.support.agent.players import Word
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 from tests.support.comms.radio import RADIOS, RATE_HZ, TICK_NS, make_medium, scattered
+from tests.support.world.mediums import ScriptedMedium
 from tests.support.world.scenes import SAMPLE
 
 AIRTIME_NS = 96_000  # airtime of three bytes
@@ -238,33 +239,6 @@ def test_packets_of_an_arena_that_leaves_are_counted_or_in_flight():
     assert loop.arena_ticks.tolist() == [6, 3]
 
 
-def received(at_ns: int, payload: bytes = b"\0\0") -> ReceivedPackets:
-    """One packet of robot 0 to robot 1."""
-    measured = {name: np.zeros(1) for name in MEASURES}
-    zero = np.zeros(1, np.int64)
-    return ReceivedPackets(zero + 1, zero, zero, zero + at_ns, measured, zero, Payloads.from_rows([payload]))
-
-
-@dataclass
-class RadioMedium:
-    """A medium that collects sent packets; packets are received at set times."""
-
-    due_ns: list[int] = field(default_factory=list[int])
-    payload: bytes = b"\0\0"
-    sent: list[SubtickPackets] = field(default_factory=list[SubtickPackets])
-    times_ns: list[int] = field(default_factory=list[int])
-
-    def send(self, packets: SubtickPackets) -> None:
-        assert packets.at_ns >= (self.times_ns or [0])[-1]
-        self.sent.append(packets)
-
-    def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        self.times_ns.append(until_ns)
-        if self.due_ns and self.due_ns[0] <= until_ns:
-            return received(self.due_ns.pop(0), self.payload), NO_TX_STATUSES
-        return ReceivedPackets.none(MEASURES), NO_TX_STATUSES
-
-
 @dataclass
 class Exchange:
     """Agents that send at set wall times and collect what is delivered."""
@@ -290,7 +264,7 @@ def subticks_of(clock: FakeClock, factor: float = 1.0, subtick_s: float = 0.010)
 
 
 def test_subticks_send_packets_at_their_time_of_arrival() -> None:
-    clock, medium = FakeClock(), RadioMedium(due_ns=[25 * MS])
+    clock, medium = FakeClock(), ScriptedMedium(due_ns=[25 * MS])
     pace, subticks = subticks_of(clock)
     exchange = Exchange(clock, [ORIGIN_NS + 12 * MS, ORIGIN_NS + 19 * MS])
     pace.begin()
@@ -305,7 +279,7 @@ def test_subticks_send_packets_at_their_time_of_arrival() -> None:
 
 
 def test_subticks_follow_the_wall_clock_at_another_pace() -> None:
-    clock, medium = FakeClock(), RadioMedium(due_ns=[130 * MS])
+    clock, medium = FakeClock(), ScriptedMedium(due_ns=[130 * MS])
     pace, subticks = subticks_of(clock, factor=2.0)
     exchange = Exchange(clock)
     for tick in range(2):
@@ -319,7 +293,7 @@ def test_subticks_follow_the_wall_clock_at_another_pace() -> None:
 
 
 def test_subticks_are_skipped_while_the_loop_lags() -> None:
-    clock, medium = FakeClock(), RadioMedium(due_ns=[1 * MS])
+    clock, medium = FakeClock(), ScriptedMedium(due_ns=[1 * MS])
     pace, subticks = subticks_of(clock)
     exchange = Exchange(clock, [ORIGIN_NS + 250 * MS], work_ns=240 * MS)
     for tick in range(2):
@@ -331,7 +305,7 @@ def test_subticks_are_skipped_while_the_loop_lags() -> None:
 
 
 def test_packets_that_arrive_during_a_pause_are_sent_in_the_next_tick() -> None:
-    clock, medium = FakeClock(), RadioMedium()
+    clock, medium = FakeClock(), ScriptedMedium()
     pace, subticks = subticks_of(clock)
     exchange = Exchange(clock)
     pace.begin()
@@ -367,7 +341,7 @@ def test_local_agents_receive_and_send_within_the_tick() -> None:
     pace, subticks = subticks_of(clock)
     backend = PacedBackend(LocalBackend(assignment(group(spec("Echo"), [0, 1]))), pace, subticks)
     backend.start()
-    medium = RadioMedium(due_ns=[25 * MS], payload=Word(number=1.0).encode())
+    medium = ScriptedMedium(due_ns=[25 * MS], payload=Word(number=1.0).encode())
     backend.act_in_time(0, one_group(0, [0, 1]), ReceivedPackets.none(MEASURES), NO_TX_STATUSES, medium)
     of_step, echo = medium.sent
     assert (of_step.at_ns, of_step.tick, of_step.sent.sender.tolist()) == (0, 0, [0, 1])
