@@ -131,6 +131,15 @@ def test_arenas_that_have_stopped_are_told_once_there_are_any():
     assert told == ["", ", 2 of 3 arenas running", ", 1 of 3 arenas running"]
 
 
+def test_history_keeps_its_averages_as_the_minute_moves_on():
+    clock, of = FakeClock(), static(4)
+    figures = seen(of, 800, clock)
+    before = figures.history("order", 2)
+    after = seen(of, 820, clock).history("order", 2)
+    assert len(before) == 30
+    assert after[:29] == before[1:]
+
+
 @pytest.mark.parametrize("tick_ms", [1, 20, 3000])
 def test_speed_is_right_for_any_duration_of_a_tick(tick_ms):
     figures = seen(static(4), 900, FakeClock(), tick_ms)
