@@ -20,6 +20,10 @@ from tests.support.deploy.runs import LOSSY, ROOT
 from tests.support.refusals import refused_input
 
 MAZE = ROOT / "scenarios" / "maze.toml"
+WALLED = ROOT / "scenarios" / "flocking-802154.toml"
+REPLAYED = ROOT / "scenarios" / "replayed-links.toml"
+HEAD = "t_s,tx,rx,delivery_ratio"
+PAIR = "flock-0,flock-1"
 ROUND = """
 format = 1
 name = "round the world"
@@ -55,26 +59,45 @@ def around(tmp_path: Path) -> Path:
     return path
 
 
-def test_maze_run_is_repeated_from_its_folder_alone(tmp_path: Path):
-    there = tmp_path / "there"
+def without_a_wall(picture: str) -> str:
+    return picture.replace("0 1 1 1 1 1 1 1 1 1 1 1 1 1", "0 0 1 1 1 1 1 1 1 1 1 1 1 1", 1)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "files", "overrides", "change"),
+    [
+        (
+            MAZE,
+            {"map": "maze.pgm", "ground": "floor.pgm"},
+            ["duration_s=2", "arena.ground.image='floor.pgm'"],
+            without_a_wall,
+        ),
+        (REPLAYED, {"trace": "replayed-links.csv"}, ["duration_s=3"], lambda _: f"{HEAD}\n0,{PAIR},1\n"),
+    ],
+)
+def test_run_with_files_is_repeated_from_its_folder_alone(tmp_path: Path, scenario, files, overrides, change):
+    there, folder = tmp_path / "there", tmp_path / "run"
     there.mkdir()
-    for name in ("maze.toml", "maze.pgm"):
-        shutil.copy(MAZE.parent / name, there)
-    shutil.copy(there / "maze.pgm", there / "floor.pgm")
-    floor = ["duration_s=2", "arena.ground.image='floor.pgm'"]
-    result = run(there / "maze.toml", overrides=floor, seeds=[3, 4], out=tmp_path / "run")
+    shutil.copy(scenario, there)
+    first, *_ = files.values()
+    original = (scenario.parent / first).read_bytes()
+    for name in files.values():
+        (there / name).write_bytes(original)
+    result = run(there / scenario.name, overrides=overrides, seeds=[3, 4], out=folder)
     shutil.rmtree(there)
-    copies = {file["path"]: file for file in json.loads((tmp_path / "run" / "run.json").read_text())["files"]}
-    digest = hashlib.sha256((MAZE.parent / "maze.pgm").read_bytes()).hexdigest()
-    assert copies["files/maze.pgm"] == {"path": "files/maze.pgm", "sha256": digest, "what": "map"}
-    assert copies["files/floor.pgm"] == {"path": "files/floor.pgm", "sha256": digest, "what": "ground"}
-    repetition = repeat((tmp_path / "run").rename(tmp_path / "moved"))
+    copies = {copied["what"]: copied for copied in json.loads((folder / "run.json").read_text())["files"]}
+    digest = hashlib.sha256(original).hexdigest()
+    for what, name in files.items():
+        assert copies[what] == {"path": f"files/{name}", "sha256": digest, "what": what}
+    moved = folder.rename(tmp_path / "moved")
+    repetition = repeat(moved)
     assert (repetition.same, repetition.changes) == (True, ())
     assert repetition.before == tuple(result.trajectory_sha256)
-    picture = tmp_path / "moved" / "files" / "maze.pgm"
-    picture.write_text(picture.read_text().replace("0 1 1 1 1 1 1 1 1 1 1 1 1 1", "0 0 1 1 1 1 1 1 1 1 1 1 1 1", 1))
-    repetition = repeat(tmp_path / "moved")
-    assert repetition.changes == ("files/maze.pgm is not as the run left it: its sha256 differs",)
+    copy = moved / "files" / first
+    copy.write_text(change(copy.read_text()))
+    repetition = repeat(moved)
+    assert repetition.changes == (f"files/{first} is not as the run left it: its sha256 differs",)
+    assert scenario == MAZE or not repetition.same
 
 
 def test_record_of_a_run_holds_heights_boundary_and_floor(tmp_path: Path):
@@ -118,10 +141,6 @@ def test_torus_with_a_setting_it_cannot_have_is_refused(around: Path, setting: s
         Simulation(around, overrides=[setting])
 
 
-WALLED = ROOT / "scenarios" / "flocking-802154.toml"
-REPLAYED = ROOT / "scenarios" / "replayed-links.toml"
-
-
 def test_shipped_links_are_cut_between_halves_when_the_file_says():
     """From 20 s to 40 s, between the first three and the last three."""
     across: dict[bool, list[bool]] = {False: [], True: []}
@@ -140,34 +159,6 @@ def test_shipped_links_are_cut_between_halves_when_the_file_says():
     assert len(across[True]) == 200 * 18
     assert sum(across[False]) / len(across[False]) > 0.6
     assert sum(beside) / len(beside) > 0.85
-
-
-def test_replayed_links_run_is_repeated_from_its_folder_alone(tmp_path: Path):
-    there = tmp_path / "there"
-    there.mkdir()
-    for file in (REPLAYED, REPLAYED.with_suffix(".csv")):
-        shutil.copy(file, there)
-    result = run(there / REPLAYED.name, overrides=["duration_s=3"], out=tmp_path / "run")
-    assert result.radio is not None
-    assert 0.7 < (result.radio.link_pdr or 0.0) < 0.99
-    shutil.rmtree(there)
-    copy = tmp_path / "run" / "files" / "replayed-links.csv"
-    assert copy.read_bytes() == REPLAYED.with_suffix(".csv").read_bytes()
-    [file] = [
-        file for file in json.loads((tmp_path / "run" / "run.json").read_text())["files"] if file["what"] == "trace"
-    ]
-    assert file == {
-        "path": "files/replayed-links.csv",
-        "sha256": hashlib.sha256(copy.read_bytes()).hexdigest(),
-        "what": "trace",
-    }
-    moved = (tmp_path / "run").rename(tmp_path / "moved")
-    repetition = repeat(moved)
-    assert (repetition.same, repetition.changes) == (True, ())
-    (moved / "files" / "replayed-links.csv").write_text("t_s,tx,rx,delivery_ratio\n0,flock-0,flock-1,1\n")
-    repetition = repeat(moved)
-    assert repetition.same is False
-    assert repetition.changes == ("files/replayed-links.csv is not as the run left it: its sha256 differs",)
 
 
 def test_signals_have_the_strengths_of_the_file(tmp_path: Path):
@@ -206,17 +197,15 @@ def lossy_with(tmp_path: Path, text: str, *settings: str) -> tuple[str, str]:
 
 
 def test_links_that_cannot_be_replayed_are_refused_before_anything_runs(tmp_path: Path):
-    head = "t_s,tx,rx,delivery_ratio"
-    strange, strength = f"{head}\n0,flock-0,flock-20,1\n", "t_s,tx,rx,rssi_dbm\n0,flock-0,flock-1,-70\n"
+    strange, strength = f"{HEAD}\n0,flock-0,flock-20,1\n", "t_s,tx,rx,rssi_dbm\n0,flock-0,flock-1,-70\n"
     nowhere, others = "radio.trace.file='nowhere.csv'", "radio.trace.others='all'"
     assert lossy_with(tmp_path, strange) == ("links.csv", "row 1, rx")
     assert lossy_with(tmp_path, strength) == ("links.csv", "rssi_dbm")
-    assert lossy_with(tmp_path, head, nowhere) == ("lossy.toml", "radio.trace.file")
-    assert lossy_with(tmp_path, head, others) == (f"--set {others}", "radio.trace.others")
+    assert lossy_with(tmp_path, HEAD, nowhere) == ("lossy.toml", "radio.trace.file")
+    assert lossy_with(tmp_path, HEAD, others) == (f"--set {others}", "radio.trace.others")
 
 
 ROBOTS = ("flock-0", "flock-1", "flock-2")
-HEAD = "t_s,tx,rx,delivery_ratio"
 
 
 def test_csv_and_parquet_are_read_by_name(tmp_path):
@@ -247,7 +236,6 @@ def test_link_traces_have_the_values_of_their_rows_per_quantity(tmp_path):
     assert traces.has_values(sender, receiver, at_ns).tolist() == [True, True, False]
 
 
-PAIR = "flock-0,flock-1"
 BOTH = "t_s,tx,rx,rssi_dbm,delay_s"
 
 
