@@ -45,20 +45,16 @@ place = { how = "disc", radius_m = 1.0 }
 """
 
 
-def test_steps_by_hand_make_the_same_run():
+def test_steps_by_hand_make_the_same_run_and_metrics_can_be_read_between():
     with Simulation(LOSSY, overrides=SHORT) as simulation:
-        ticks = [simulation.step().tick for _ in range(simulation.plan.ticks)]
-    assert ticks == list(range(20))
-    assert simulation.result.ended == "duration"
-    assert simulation.result.trajectory_sha256 == run(LOSSY, overrides=SHORT).trajectory_sha256
-
-
-def test_metrics_can_be_read_between_steps():
-    with Simulation(LOSSY, overrides=SHORT) as simulation:
-        simulation.run(7)
+        ticks = [simulation.step().tick for _ in range(7)]
+        simulation.run(20)
         order = simulation.metrics.latest["order"][0]
-        assert simulation.tick == 7
-    assert simulation.result.metrics["order"].final == order
+        assert (ticks, simulation.tick) == (list(range(7)), 20)
+    complete = run(LOSSY, overrides=SHORT)
+    assert simulation.result.ended == "duration"
+    assert simulation.result.trajectory_sha256 == complete.trajectory_sha256
+    assert simulation.result.metrics["order"].final == complete.metrics["order"].final == order
 
 
 def test_run_that_is_left_early_has_a_summary_so_far(tmp_path):

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import body_from, load_body
@@ -248,16 +249,6 @@ def test_led_holds_its_colour_until_it_is_switched_again() -> None:
     assert before[4, 7] == 0xFF0000  # published arrays do not change
 
 
-def test_leds_of_dead_robots_are_dark_and_cannot_be_switched() -> None:
-    leds = LedStates(GROUPS, 2)
-    leds.apply(changes((0, 0, 5), (1, 0, 6)), EVERYBODY)
-    dead = np.arange(6) == 1
-    leds.darken(dead)
-    leds.apply(changes((0, 1, 7), (1, 1, 8)), ~dead)
-    assert leds.published[0, :2].tolist() == [5, 7]
-    assert not leds.published[1].any()
-
-
 def test_led_that_a_robot_does_not_have_is_counted() -> None:
     leds = LedStates(GROUPS, 2)
     leds.apply(changes((0, 8, 5), (0, 7, 6), (2, 12, 7), (2, 2**40, 7)), EVERYBODY)
@@ -277,12 +268,16 @@ def test_bodies_without_leds_need_no_room() -> None:
 
 def test_world_switches_leds_and_darkens_dead_robots() -> None:
     world = World(posed([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), [1], {})
-    still = np.zeros(2)
-    rows, drive = np.arange(2), np.zeros(2, np.bool_)
-    world.move(Actions(rows, drive, still, still, still, leds=changes((0, 0, 5), (1, 3, 6), (1, 8, 9))))
-    assert world.actuators.leds.published[[0, 1], [0, 3]].tolist() == [5, 6]
+
+    def switch(*listed: tuple[int, int, int]) -> IntArray:
+        still, rows = np.zeros(2), np.arange(2)
+        world.move(Actions(rows, np.zeros(2, np.bool_), still, still, still, leds=changes(*listed)))
+        return world.actuators.leds.published
+
+    assert switch((0, 0, 5), (1, 3, 6), (1, 8, 9))[[0, 1], [0, 3]].tolist() == [5, 6]
     world.set_alive(np.array([True, False]))
     assert not world.actuators.leds.published[1].any()
+    assert switch((0, 1, 7), (1, 1, 8))[:, :2].tolist() == [[5, 7], [0, 0]]
     world.set_alive(np.array([True, True]))
-    assert np.count_nonzero(world.actuators.leds.published) == 1
+    assert np.count_nonzero(world.actuators.leds.published) == 2
     assert world.counts()["leds_not_there"].tolist() == [1]

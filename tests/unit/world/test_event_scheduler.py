@@ -5,16 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
-from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
+from swarmwire.comms.robot.packets import ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.world.backends import allocation as assignments
 from swarmwire.world.event_scheduler import Effects, EventScheduler
 from swarmwire.world.events.selection import Selection, Swarm
 from swarmwire.world.live_events import LiveEvents
@@ -130,16 +128,6 @@ def test_events_end_before_others_begin_at_the_same_time():
     assert [not truth.alive[0] for truth in seen] == [tick >= 2 for tick in range(9)]
     assert [(e.ended, e.changed.tolist()) for e in seen[4].events] == [(False, [False, True]), (True, [False, True])]
     assert all(truth.alive[1] for truth in seen)
-
-
-def test_run_continues_with_all_robots_dead():
-    scenario = posed(TWO)
-    world = World(scenario, [1], {})
-    complete = assignments.full_assignment(scenario, world.static, {"a": "swarmwire.agent.behaviours:Diffusion"})
-    world.set_alive(np.zeros(2, np.bool_))
-    backend = LocalBackend(complete)
-    backend.start()
-    assert len(backend.act(0, world.sense(0), ReceivedPackets.none(), NO_TX_STATUSES).rows) == 0
 
 
 def test_radio_graph_excludes_dead_disabled_and_partitioned_pairs():

@@ -7,13 +7,10 @@ import pytest
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.events.robot_events import Kill
 from swarmwire.world.live_events import MAX_WAITING, LiveEvent, LiveEvents
-from swarmwire.world.loop import Loop
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario_file import scenario_from
-from swarmwire.world.world import World
 from tests.support.refusals import refused_input
-from tests.support.world.scenes import changed, posed
-from tests.unit.world.test_event_scheduler import ForwardBackend, Watch
+from tests.support.world.scenes import changed
 
 RATE_HZ = 10
 KILL: dict[str, Any] = {"do": "kill", "robots": {"names": ["flock-1"]}}
@@ -170,19 +167,3 @@ def test_replayed_live_events_happen_and_new_ones_are_refused():
         live_events(replayed=[LiveEvent(0, 2, {"do": "kill"})])
     with pytest.raises(BadInput, match="^event 1 that was given: expected a number that no other event has"):
         live_events(replayed=[LiveEvent(0, 1, KILL)])
-
-
-def test_live_event_begins_and_ends_at_the_ticks_of_its_requests():
-    scenario = posed([[-1.0, 0.0, 0.0], [-1.0, 1.0, 0.0]])
-    live, watch = LiveEvents(scenario, bodies_of(scenario, "s.toml")), Watch()
-    loop = Loop(World(scenario, [1], {}), None, ForwardBackend(), [watch], live_events=live)
-    loop.run(2)
-    number = live.submit({"do": "kill", "robots": {"names": ["a-1"]}})
-    loop.run(5)
-    live.end(number)
-    loop.run(8)
-    assert [truth.alive.tolist() for truth in watch.seen] == [[True, True]] * 2 + [[True, False]] * 3 + [
-        [True, True]
-    ] * 3
-    events = [(truth.tick, event.serial, event.ended) for truth in watch.seen for event in truth.events]
-    assert events == [(2, number, False), (5, number, True)]

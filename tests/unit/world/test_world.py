@@ -107,18 +107,6 @@ def test_robots_without_a_command_keep_the_last_one() -> None:
     assert world.command.tolist() == [[0.05, 0.0, 0.0], [0.06, 0.0, 0.0], [0.01, 0.5, 0.0]]
 
 
-def test_commands_that_are_not_finite_are_dropped_and_counted() -> None:
-    world = World(posed([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), [1], {})
-    world.move(commanded(world, 0.05, 0.1))
-    world.move(commanded(world, [np.nan, 0.01, 0.02], [0.0, np.inf, 0.3]))
-    assert world.command.tolist() == [[0.05, 0.1, 0.0], [0.05, 0.1, 0.0], [0.02, 0.3, 0.0]]
-    assert world.counts()["nan_commands"].tolist() == [2]
-    assert world.counts()["clipped_commands"].tolist() == [0]
-    unasked = commanded(world, np.nan, 0.0)
-    world.move(Actions(unasked.rows, ~unasked.drive, unasked.linear_mps, unasked.angular_radps, unasked.lateral_mps))
-    assert world.counts()["nan_commands"].tolist() == [2]
-
-
 def test_arrays_of_a_tick_are_not_written_to_later() -> None:
     world = sample_world(1)
     arrays = world.pose, world.velocity, world.command

@@ -1,12 +1,9 @@
 """What a sweep writes, statistics read: a campaign's folder by its writer, seen through its reader."""
 
-from types import SimpleNamespace
-
 import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaigns.columns import ResultColumns
 from swarmwire.deploy.campaigns.store import CampaignWriter, StorageFailed
 from swarmwire.deploy.campaigns.worker import TaskResult
 from swarmwire.metrics.records.campaign.campaign_json import Campaign, Response, write_campaign
@@ -112,12 +109,6 @@ def test_damaged_series_fails_in_one_line_while_it_is_joined(written, monkeypatc
     with pytest.raises(StorageFailed, match="--resume") as failed:
         written.finish(1)
     assert "\n" not in str(failed.value)
-
-
-def test_last_row_of_a_run_counts():
-    columns = ResultColumns(SimpleNamespace(points=[{}], vary={}, responses=()))
-    rows = [{"run": 0, "point": 0, "seed": 1, "ended": ended} for ended in ("failed", "duration")]
-    assert columns.joined(columns.frame([row]) for row in rows)["ended"].to_list() == ["duration"]
 
 
 @pytest.mark.parametrize("name", ["parts", "series", "runs"])

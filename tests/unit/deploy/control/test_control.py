@@ -8,7 +8,6 @@ import pytest
 from typer.testing import CliRunner
 
 from swarmwire.comms.base.errors import SwarmwireError
-from swarmwire.deploy import repeat
 from swarmwire.deploy.cli.actions.inject import robot_selection
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.live.remote_control import Refused
@@ -190,38 +189,12 @@ def test_refused_requests_get_one_line_and_leave_the_run_going(tmp_path, table, 
     assert simulation.result.live_events is None
 
 
-def test_unlimited_speed_in_real_time_is_refused(tmp_path):
-    with going(tmp_path / "run", "duration_s=1", realtime=5) as (simulation, control):
-        assert control.status()["real_time"]
-        with pytest.raises(Refused, match="wall clock"):
-            control.speed(None)
-        assert "50 times" in control.speed(50)["done"]
-    assert simulation.result.realtime is not None
-
-
 def test_stopped_run_has_a_summary(tmp_path):
     with going(tmp_path / "run", "duration_s=1000") as (simulation, control):
         control.step(2)
         at_tick(control, 2)
         control.stop()
     assert (simulation.result.ended, simulation.result.ticks) == ("interrupted", 2)
-
-
-SIGNALS = ["radio={preset='ieee802154', measures={range={}, bearing={}}}", SHORT]
-
-
-def test_live_jammer_is_repeated_from_the_record(tmp_path):
-    with going(tmp_path / "run", *SIGNALS) as (simulation, control):
-        control.step(3)
-        at_tick(control, 3)
-        jammer = control.event({"do": "jammer", "at": [0.0, 0.0], "power_dbm": 10.0})
-        control.step(10)
-        at_tick(control, 13)
-        control.end(jammer)
-    radio = simulation.result.radio
-    assert radio is not None
-    assert radio.fates["jammed"] > 0
-    assert repeat(tmp_path / "run").same
 
 
 def ctl(*arguments: object) -> str:

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import AgentFailed, RunnerLost
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, SentPackets, TxStatuses
@@ -17,18 +16,13 @@ from swarmwire.comms.wire.tick_frames import decode_tick, encode_actions
 from swarmwire.world.backends.join_policy import JoinRefused
 from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.pacing import Pace
-from swarmwire.world.backends.realtime_backend import PacedBackend
 from swarmwire.world.backends.registry import OnLoss
 from tests.support.agent.hosts import (
     MEASURES,
     SILENCE,
-    assignment,
-    group,
-    one_group,
     plain,
     readings,
     received_from,
-    spec,
 )
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
 from tests.support.world.locksteps import (
@@ -43,28 +37,12 @@ from tests.support.world.locksteps import (
     playing_lockstep,
     ready,
     request,
-    rows_of,
     state,
     two_parts,
     valid_answer,
 )
 
 OWNERS = st.lists(st.integers(0, 3), min_size=8, max_size=8)
-
-
-def test_tick_is_complete_once_all_runners_answered() -> None:
-    lockstep = playing_lockstep()
-    for tick in range(3):
-        out = dict(lockstep.open_tick(tick, all_readings(tick), SILENCE))
-        assert list(out) == ["a", "b"]
-        assert {frames.decode(data).tick for data in out.values()} == {tick}
-        for name in ("a", "b"):
-            assert lockstep.waiting
-            assert lockstep.missing[0] == name
-            lockstep.answer(name, encode_actions(tick, actions(rows_of(out[name]))))
-        assert not lockstep.waiting
-        assert sorted(lockstep.pop_actions().rows.tolist()) == list(range(8))
-    assert not lockstep.counts()
 
 
 @pytest.mark.parametrize(
@@ -345,20 +323,6 @@ def test_pace_reports_a_lag_at_once_and_then_every_five_seconds() -> None:
         pace.wait(tick)
     assert pace.missed_ticks == 60
     assert [text.split("at tick ")[1].split()[0] for text in reports] == ["0", "25", "50"]
-
-
-def test_paced_backend_acts_like_the_unpaced_one() -> None:
-    clock, pace, _ = paced()
-    free, backend = (LocalBackend(assignment(group(spec("Counter"), [0, 1]))) for _ in range(2))
-    held = PacedBackend(backend, pace)
-    free.start()
-    held.start()
-    for tick in range(2):
-        expected = free.act(tick, one_group(tick, [0, 1]), SILENCE)
-        got = held.act(tick, one_group(tick, [0, 1]), SILENCE)
-        assert got.linear_mps.tolist() == expected.linear_mps.tolist()
-    assert clock.slept_until == [ORIGIN_NS + 100 * MS, ORIGIN_NS + 200 * MS]
-    assert (held.report().factor, held.report().missed_ticks, held.report().late_answers) == (1.0, 0, {})
 
 
 def test_pace_restart_forgets_lag_and_pause() -> None:

@@ -170,28 +170,20 @@ def test_answer_to_an_old_or_future_tick_changes_nothing(tick: int) -> None:
     assert runners.counts() == {"wrong_tick_frames": 1}
 
 
-def test_skipped_frames_are_counted_with_their_packets() -> None:
+def test_skipped_frames_are_counted_with_their_packets_and_tx_status() -> None:
     runners = playing()
     sent = SentPackets(np.array([1]), np.array([BROADCAST]), Payloads.from_rows([b"xyz"]))
-    open_tick(runners, 0, received_from(sent, [0, 2, 3]))  # two packets to a, one to b
+    statuses = TxStatuses(np.array([0, 0, 1]), np.array([0, 1, 0]), np.array([0, 1, 0]))  # two to a, one to b
+    received = received_from(sent, [0, 2, 3])  # two packets to a, one to b
+    runners.open_tick(0, 0, one_group(0, ROWS), received, statuses)
     open_tick(runners, 1, received_from(sent, [0]))
     open_tick(runners, 2, received_from(sent, [2]))
+    assert (runners.frames_dropped, runners.packets_dropped, runners.tx_status_dropped) == (0, 0, 0)
     runners.answer("a", answer_of("a", 2, 1.0))
-    assert (runners.frames_dropped, runners.packets_dropped) == (2, 3)
+    assert (runners.frames_dropped, runners.packets_dropped, runners.tx_status_dropped) == (2, 3, 2)
     assert not runners.late.any()
     runners.answer("b", answer_of("b", 0, 1.0))
-    assert (runners.frames_dropped, runners.packets_dropped) == (2, 3)
-
-
-def test_tx_status_in_skipped_frames_is_counted() -> None:
-    runners = playing()
-    statuses = TxStatuses(np.array([0, 0, 2]), np.array([0, 1, 0]), np.array([0, 1, 0]))
-    for tick in range(2):
-        runners.open_tick(tick, tick * TICK_NS, one_group(tick, ROWS), SILENCE, statuses)
-    assert runners.tx_status_dropped == 0
-    owned = sum(row in ROWS_OF["a"] for row in statuses.row.tolist())
-    runners.answer("a", answer_of("a", 1, 1.0))
-    assert (runners.frames_dropped, runners.tx_status_dropped) == (1, owned)
+    assert (runners.frames_dropped, runners.packets_dropped, runners.tx_status_dropped) == (2, 3, 2)
 
 
 def test_watchdog_stops_a_robot_without_answers_once() -> None:

@@ -142,24 +142,6 @@ def test_robots_fill_a_disc_and_all_headings_evenly() -> None:
     assert abs(np.mean(np.abs(pose[:, 2]) < np.pi / 2) - 0.5) < 0.045
 
 
-def test_grid_is_centred_and_evenly_spaced() -> None:
-    mapping = changed(
-        "robots.flock", {"body": "epuck", "count": 6, "agent": "x", "place": {"how": "grid", "spacing_m": 0.3}}
-    )
-    mapping["arena"]["obstacles"] = []
-    xy = built(mapping, 1).pose[:6, :2]
-    assert np.allclose(xy, [[-0.3, -0.15], [0, -0.15], [0.3, -0.15], [-0.3, 0.15], [0, 0.15], [0.3, 0.15]])
-
-
-def test_poses_are_used_with_wrapped_headings() -> None:
-    poses = [[0.0, 0.0, 0.5], [0.3, 0.0, 4.0]]
-    mapping = changed(
-        "robots.flock", {"body": "epuck", "count": 2, "agent": "x", "place": {"how": "poses", "poses": poses}}
-    )
-    mapping["arena"]["obstacles"] = []
-    assert np.allclose(built(mapping, 1).pose[:2], [[0, 0, 0.5], [0.3, 0, 4.0 - 2 * np.pi]])
-
-
 def one_group(placement: dict[str, Any], count: int = 12, **arena: Any) -> dict[str, Any]:
     """A scenario with one group of e-pucks in 6 x 4 m unless `arena` has another size."""
     group = {"body": "epuck", "count": count, "agent": "x", "place": placement}
@@ -177,6 +159,16 @@ def gaps(world: World, wrapped: bool = False) -> FloatArray:
         away -= size * np.round(away / size)
     distance = np.hypot(*away.transpose(2, 0, 1)) - radius[:, None] - radius
     return distance[np.triu_indices(len(xy), 1)]
+
+
+def test_grid_is_centred_and_evenly_spaced() -> None:
+    xy = built(one_group({"how": "grid", "spacing_m": 0.3}, 6), 1).pose[:, :2]
+    assert np.allclose(xy, [[-0.3, -0.15], [0, -0.15], [0.3, -0.15], [-0.3, 0.15], [0, 0.15], [0.3, 0.15]])
+
+
+def test_poses_are_used_with_wrapped_headings() -> None:
+    pose = built(one_group({"how": "poses", "poses": [[0.0, 0.0, 0.5], [0.3, 0.0, 4.0]]}, 2), 1).pose
+    assert np.allclose(pose, [[0, 0, 0.5], [0.3, 0, 4.0 - 2 * np.pi]])
 
 
 RING: dict[str, Any] = {"how": "ring", "inner_radius_m": 1.0, "radius_m": 1.5, "at": [0.5, 0.2]}

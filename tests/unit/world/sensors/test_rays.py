@@ -76,14 +76,6 @@ def test_light_ahead_of_an_epuck_reads_as_the_law() -> None:
     assert answers == pytest.approx([near, side, 0, 0, 0, 0, side, near])
 
 
-def test_light_reaches_footbot_cells_within_a_quarter_turn() -> None:
-    answers = values(scene([[0.0, 0.0, np.deg2rad(7.5)]], FOOTBOT, lights=(Light(0.0, 0.5, 1.0),)), FOOTBOT)[0]
-    assert FOOTBOT.light is not None
-    off = np.deg2rad(FOOTBOT.light.angles_deg) + np.deg2rad(7.5) - np.pi / 2
-    assert answers == pytest.approx(law(0.5, 1.0, off))
-    assert np.count_nonzero(answers > 1e-9) == 11  # 13 nearest cells without the two that look a quarter turn away
-
-
 @pytest.mark.parametrize(("distance_m", "lit"), [(2.4999, True), (2.5001, False)])
 def test_light_is_dark_beyond_two_and_a_half_times_its_intensity(distance_m: float, lit: bool) -> None:
     answers = values(scene([[0.0, 0.0, 0.0]], EPUCK, lights=(Light(0.0, distance_m, 1.0),)))

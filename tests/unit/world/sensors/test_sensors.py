@@ -343,17 +343,3 @@ def test_readings_do_not_depend_on_how_often_a_group_acts(tmp_path: Path, record
         for field, values in (read["a"].fields if read else {}).items():
             assert np.array_equal(values, recorded[tick][field], equal_nan=True), field
         move_all(seldom, tick)
-
-
-def test_failed_sensor_reads_blank_and_others_are_unchanged(tmp_path: Path, recorded: list[dict[str, Any]]) -> None:
-    built = world(tmp_path, (1, 2))
-    for tick in range(13):
-        for sensor in built.sensors["a"].values():
-            sensor.failed = np.arange(18).reshape(2, 9) % 3 == 0 if tick == 12 else None
-        read = built.sense(tick)["a"].fields
-        if tick == 12:
-            for field, values in read.items():
-                blank = recorded[0][field][0]
-                assert np.array_equal(values[::3], np.broadcast_to(blank, values[::3].shape), equal_nan=True), field
-                assert np.array_equal(values[1::3], recorded[12][field][1::3], equal_nan=True), field
-        move_all(built, tick)

@@ -316,16 +316,3 @@ def test_imu_biases_are_drawn_once_and_drift_by_tick() -> None:
     assert drifted == pytest.approx(walk * np.array([0.1, 0.1, 0.02]) * np.sqrt(0.1))
     # 500 draws: the standard deviation is known to 3.2 %; four of them, 1 in 16,000 for each of three.
     assert drifted.std(axis=0) == pytest.approx(np.array([0.1, 0.1, 0.02]) * np.sqrt(0.5), rel=0.127)
-
-
-def test_imu_drifts_on_while_it_is_not_read() -> None:
-    looked_at = scene(np.zeros((3, 3)), EPUCK)
-    spec = ImuSpec(drift_mps2=0.1, bias_std_radps=0.1, noise_radps=0.1)
-    always, seldom = (staged(looked_at, EPUCK, "imu", spec) for _ in range(2))
-    for tick in range(9):
-        looked_at.state[0, :, 2:5] += 0.01 * tick
-        fields = always.read(tick)
-        if tick % 4:
-            seldom.follow(tick)
-        else:
-            assert all(np.array_equal(fields[name], values) for name, values in seldom.read(tick).items())

@@ -81,14 +81,6 @@ def test_values_that_are_not_finite_pass_all_stages(nothing: float) -> None:
     assert np.array_equal(after_stages(field, nothing), np.full((2, 5, 4), nothing), equal_nan=True)
 
 
-def test_errors_of_an_arena_are_equal_alone_and_among_others() -> None:
-    field = Field("value", 4, Noise("normal", 0.1))
-    both, alone = after_stages(field, 1.0), np.ones((1, 5, 4))
-    ErrorStages("sense", field, 0.0, 0.0).apply(alone, KEYS[1:], 3, 9)
-    assert np.array_equal(alone[0], both[1])
-    assert not (both[0] == both[1]).any()
-
-
 class Counter:
     """A sensor of the tick and of the number of ticks so far."""
 
@@ -147,15 +139,6 @@ def test_readings_follow_the_rate_and_the_delay(keys: Any, shown: list[int | Non
         else:
             for name in ("counter.tick", "counter.seen"):
                 assert np.array_equal(read[tick][name], fresh[taken][name])
-
-
-@pytest.mark.parametrize("keys", [{}, {"rate_hz": 4.0}, {"delay_s": 0.2}, {"rate_hz": 3.0, "delay_s": 0.3}])
-def test_pipeline_does_not_depend_on_how_often_it_is_read(keys: dict[str, float]) -> None:
-    always, seldom = read_ticks(counter_sensor(**keys), 24), read_ticks(counter_sensor(**keys), 24, every=5)
-    assert seldom.keys() == {0, 5, 10, 15, 20}
-    for tick, fields in seldom.items():
-        for name, values in fields.items():
-            assert np.array_equal(values, always[tick][name], equal_nan=True)
 
 
 @pytest.mark.parametrize("keys", [{}, {"rate_hz": 1.0}])
