@@ -87,9 +87,6 @@ def test_grid_combines_all_values_and_varies_the_last_path_fastest():
 
 def test_list_design_pairs_values_one_to_one():
     assert points("list", "a=1,2", "b=0:1:2") == [{"a": 1, "b": 0.0}, {"a": 2, "b": 1.0}]
-
-
-def test_list_design_accepts_a_value_of_several_points():
     assert points("list", "a=0.5,0.7", "b=2,2") == [{"a": 0.5, "b": 2}, {"a": 0.7, "b": 2}]
 
 

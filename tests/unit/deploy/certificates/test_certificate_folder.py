@@ -79,12 +79,9 @@ def test_revoked_name_is_listed_and_never_issued_again(folder: Path, clock: Date
     assert "flock-0 is revoked" in refusal(folder, clock, "flock-2", "flock-0")
 
 
-def test_revoke_refuses_a_name_without_certificate(folder: Path, clock: DatedFakeClock):
+def test_unknown_name_is_not_revoked_and_a_folder_with_files_becomes_no_ca(folder: Path, clock: DatedFakeClock):
     with refused_input(folder, "flock-9"):
         revoke(folder, "flock-9", clock)
-
-
-def test_ca_is_refused_in_a_folder_with_files(folder: Path, clock: DatedFakeClock):
     with refused_input(folder):
         begin_authority(folder, clock)
 

@@ -1,6 +1,7 @@
 """The panel fits the terminal, shows the run's figures, and is drawn seldom enough to cost nothing."""
 
 import io
+from typing import Self
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.observe.truth import EventRecord, Static, Truth
+from swarmwire.comms.observe.truth import EventRecord, Static
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.cli.display.figures import Figures
 from swarmwire.deploy.cli.display.panel import Panel, panel_view, sparkline
@@ -118,15 +119,10 @@ def test_figures_are_those_of_the_last_second_and_of_the_whole_run():
 
 
 def test_arenas_that_have_stopped_are_told_once_there_are_any():
-    of, metrics = static(2, arenas=3), Metrics(["order"])
-    figures = Figures(10, metrics, FakeClock())
-    metrics.begin(of)
-    figures.begin(of)
+    figures = seen(of := static(2, arenas=3), 0, FakeClock())
     told = []
-    for tick, running in enumerate(([1, 1, 1], [1, 0, 1], [0, 0, 1])):
-        now = truth(of, tick, running=np.array(running, np.bool_))
-        metrics.see(now)
-        figures.see(now)
+    for running in ([1, 1, 1], [1, 0, 1], [0, 0, 1]):
+        figures.see(truth(of, running=np.array(running, np.bool_)))
         told.append(figures.stopped)
     assert told == ["", ", 2 of 3 arenas running", ", 1 of 3 arenas running"]
 
@@ -208,60 +204,62 @@ class SlowFile(io.StringIO):
         return super().write(text)
 
 
-@pytest.fixture
-def drawn():
-    panels: list[Panel] = []
+class Drawn:
+    """A panel of a run that a test lets tick, and its terminal."""
 
-    def begin(takes_ns: int) -> tuple[FakeClock, SlowFile, Controls, Panel, Metrics, Static]:
-        clock, of, metrics = FakeClock(), static(4), Metrics()
-        file, controls = SlowFile(clock, takes_ns), Controls(clock, 10)
-        console = Console(width=80, height=24, file=file, force_terminal=True)
-        panel = Panel(TICKS, metrics, controls, lambda: None, clock, console)
-        metrics.begin(of)
-        panel.begin(of)
-        panels.append(panel)
-        return clock, file, controls, panel, metrics, of
+    def __init__(self, takes_ns: int) -> None:
+        self.clock, self.static, self.metrics = FakeClock(), static(4), Metrics()
+        self.file, self.controls = SlowFile(self.clock, takes_ns), Controls(self.clock, 10)
+        console = Console(width=80, height=24, file=self.file, force_terminal=True)
+        self.panel = Panel(TICKS, self.metrics, self.controls, lambda: None, self.clock, console)
 
-    yield begin
-    for panel in panels:
-        panel.end(None)
+    def __enter__(self) -> Self:
+        self.metrics.begin(self.static)
+        self.panel.begin(self.static)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.file.gone = False
+        self.panel.end(None)
+
+    def tick(self, number: int = 0) -> None:
+        moment = truth(self.static, number)
+        self.metrics.see(moment)
+        self.panel.see(moment)
+
+    def wait(self, tick: int) -> None:
+        """Let a second of wall time pass before this tick."""
+        until_ns = self.clock.time_ns + NS_PER_S
+        self.controls.wait(tick, lambda: self.clock.time_ns >= until_ns)
 
 
-def tick_by(moment: Truth, metrics: Metrics, panel: Panel) -> None:
-    metrics.see(moment)
-    panel.see(moment)
-
-
-def test_there_are_ten_pictures_a_second_at_most_and_they_take_a_hundredth_of_the_run(drawn):
-    for takes_ns, most in ((0, 10), (MS, 7), (3 * MS, 3)):
-        clock, file, _, panel, metrics, of = drawn(takes_ns)
-        began_ns = clock.time_ns
-        file.at_ns.clear()
+@pytest.mark.parametrize(("takes_ns", "most"), [(0, 10), (MS, 7), (3 * MS, 3)])
+def test_panel_is_drawn_ten_times_a_second_at_most_and_takes_a_hundredth_of_the_run(takes_ns, most):
+    with Drawn(takes_ns) as drawn:
+        began_ns = drawn.clock.time_ns
+        drawn.file.at_ns.clear()
         for tick in range(1000):
-            clock.time_ns += 10 * MS
-            tick_by(truth(of, tick), metrics, panel)
-        pictures = len(file.at_ns)
-        assert pictures <= most * (clock.time_ns - began_ns) / NS_PER_S + 1
-        assert pictures >= 2 * (clock.time_ns - began_ns) / NS_PER_S - 1
-        assert pictures * takes_ns <= 0.01 * (clock.time_ns - began_ns)
+            drawn.clock.time_ns += 10 * MS
+            drawn.tick(tick)
+        pictures, took_ns = len(drawn.file.at_ns), drawn.clock.time_ns - began_ns
+    assert 2 * took_ns / NS_PER_S - 1 <= pictures <= most * took_ns / NS_PER_S + 1
+    assert pictures * takes_ns <= 0.01 * took_ns
 
 
-def test_paused_run_is_still_drawn(drawn):
-    clock, file, controls, panel, metrics, of = drawn(0)
-    tick_by(truth(of), metrics, panel)
-    controls.pause()
-    until_ns, before = clock.time_ns + NS_PER_S, len(file.at_ns)
-    controls.wait(1, lambda: clock.time_ns >= until_ns)
-    assert 8 <= len(file.at_ns) - before <= 11
-    assert "paused" in file.getvalue()
+def test_paused_run_is_still_drawn():
+    with Drawn(0) as drawn:
+        drawn.tick()
+        drawn.controls.pause()
+        before = len(drawn.file.at_ns)
+        drawn.wait(1)
+        assert 8 <= len(drawn.file.at_ns) - before <= 11
+    assert "paused" in drawn.file.getvalue()
 
 
-def test_terminal_lost_in_a_pause_raises_at_the_next_tick(drawn):
-    clock, file, controls, panel, metrics, of = drawn(0)
-    controls.pause()
-    file.gone = True
-    until_ns = clock.time_ns + NS_PER_S
-    controls.wait(0, lambda: clock.time_ns >= until_ns)
-    with pytest.raises(OSError, match="the terminal is gone"):
-        tick_by(truth(of), metrics, panel)
-    file.gone = False
+def test_terminal_lost_in_a_pause_raises_at_the_next_tick():
+    with Drawn(0) as drawn:
+        drawn.controls.pause()
+        drawn.file.gone = True
+        drawn.wait(0)
+        with pytest.raises(OSError, match="the terminal is gone"):
+            drawn.tick()

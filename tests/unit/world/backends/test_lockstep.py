@@ -42,6 +42,7 @@ from tests.support.world.locksteps import (
     valid_answer,
 )
 
+PLAYED_BY_B = "flock-4, flock-5, scouts-6, lone-7 (4 robots)"
 OWNERS = st.lists(st.integers(0, 3), min_size=8, max_size=8)
 
 
@@ -192,21 +193,21 @@ def packet_rows(received: ReceivedPackets) -> list[Any]:
 
 
 @pytest.mark.parametrize("opened", [False, True])
-def test_failed_agent_ends_the_run_with_robots_and_traceback(opened: bool) -> None:
+@pytest.mark.parametrize(
+    ("values", "robots"),
+    [
+        ({"robots": "flock-4", "traceback": "Boom"}, "flock-4"),
+        *((values, PLAYED_BY_B) for values in ({}, {"robots": "x"}, {"robots": 1, "traceback": "y"})),
+    ],
+)
+def test_failed_agent_ends_the_run_with_robots_and_traceback(opened: bool, values: dict[str, Any], robots: str) -> None:
     lockstep = joined(lockstep_of_two(), "a", "b")
     if opened:
         ready(lockstep, "a", "b").open_tick(0, all_readings(), SILENCE)
     with pytest.raises(AgentFailed) as caught:
-        lockstep.answer("b", frames.encode("failed", 0, {}, {"robots": "flock-4", "traceback": "Boom"}))
-    assert (caught.value.robots, caught.value.traceback) == ("flock-4", "Boom")
-
-
-@pytest.mark.parametrize("values", [{}, {"robots": "x"}, {"robots": 1, "traceback": "y"}], ids=repr)
-def test_failure_without_text_names_the_runners_robots(values: dict[str, Any]) -> None:
-    lockstep = joined(lockstep_of_two(), "a", "b")
-    with pytest.raises(AgentFailed) as caught:
         lockstep.answer("b", frames.encode("failed", 0, {}, values))
-    assert caught.value.robots == "flock-4, flock-5, scouts-6, lone-7 (4 robots)"
+    assert caught.value.robots == robots
+    assert ("Boom" in caught.value.traceback) == (robots == "flock-4")
 
 
 @pytest.mark.parametrize("on_loss", ["dead", "stand", "coast", "wait"])
@@ -228,7 +229,7 @@ def test_lost_runner_ends_the_run_if_it_plays_robots() -> None:
     assert state(lockstep) == before
     with pytest.raises(RunnerLost) as caught:
         lockstep.lose("b", "its link is gone")
-    assert (caught.value.runner, caught.value.robots) == ("b", "flock-4, flock-5, scouts-6, lone-7 (4 robots)")
+    assert (caught.value.runner, caught.value.robots) == ("b", PLAYED_BY_B)
     assert caught.value.reason == "its link is gone"
 
 

@@ -21,7 +21,26 @@ from tests.support.refusals import refused_input
 from tests.support.world.scenes import SAMPLE
 
 SIGNAL = {"model": "log-distance"}
+BURST_FAULTS: dict[str, list[dict[str, float]]] = {  # by the key below radio.bursts
+    "p": [
+        {"p": 0.1, "r": 0.5, "interval_s": 0.1, "bad_s": 1.0},
+        {"interval_s": 0.1},
+        {"p": 1.0, "r": 0.5, "interval_s": 1.0},
+        {"mean_loss": 0.1, "p": 0.1},
+    ],
+    "interval_s": [{"p": 0.1, "r": 0.5}],
+    "r": [{"p": 0.5, "r": 0.5, "interval_s": 1.0}],
+    "mean_loss": [
+        {"mean_loss": 0.1, "good_s": 1.0},
+        {"mean_loss": 1.0},
+        {"mean_loss": 0.5, "loss_bad": 0.5},
+        {"mean_loss": 0.1, "loss_good": 0.2},
+        {"mean_loss": 1e-9},
+    ],
+    "loss_bad": [{"loss_bad": 0.1, "loss_good": 0.2}],
+}
 FAULTS: list[tuple[dict[str, Any], str]] = [
+    *(({**SIGNAL, "bursts": table}, f"radio.bursts.{key}") for key, tables in BURST_FAULTS.items() for table in tables),
     ({}, "radio.range_m"),
     ({"preset": "nothing"}, "radio.preset"),
     ({"range_m": 2.0, "access": {}}, "radio.access"),
@@ -37,20 +56,8 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({**SIGNAL, "reception": {"model": "table"}}, "radio.reception.table"),
     ({**SIGNAL, "delays": {"distribution": "uniform", "deviation_s": 1.0}}, "radio.delays.deviation_s"),
     ({"preset": "ieee802154", "model": "unit-disk", "range_m": 1.0}, "radio.antenna"),
-    ({**SIGNAL, "bursts": {"p": 0.1, "r": 0.5, "interval_s": 0.1, "bad_s": 1.0}}, "radio.bursts.p"),
     ({"preset": "gilbert", "bursts": {"r": 0.5}}, "radio.bursts.r"),
-    ({**SIGNAL, "bursts": {"p": 0.1, "r": 0.5}}, "radio.bursts.interval_s"),
-    ({**SIGNAL, "bursts": {"interval_s": 0.1}}, "radio.bursts.p"),
-    ({**SIGNAL, "bursts": {"p": 0.5, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.r"),
-    ({**SIGNAL, "bursts": {"p": 1.0, "r": 0.5, "interval_s": 1.0}}, "radio.bursts.p"),
-    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "good_s": 1.0}}, "radio.bursts.mean_loss"),
-    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "p": 0.1}}, "radio.bursts.p"),
-    ({**SIGNAL, "bursts": {"mean_loss": 1.0}}, "radio.bursts.mean_loss"),
-    ({**SIGNAL, "bursts": {"mean_loss": 0.5, "loss_bad": 0.5}}, "radio.bursts.mean_loss"),
-    ({**SIGNAL, "bursts": {"mean_loss": 0.1, "loss_good": 0.2}}, "radio.bursts.mean_loss"),
-    ({**SIGNAL, "bursts": {"mean_loss": 1e-9}}, "radio.bursts.mean_loss"),
     ({"range_m": 2.0, "cut_off_db": 3.0}, "radio.cut_off_db"),
-    ({**SIGNAL, "bursts": {"loss_bad": 0.1, "loss_good": 0.2}}, "radio.bursts.loss_bad"),
     ({**SIGNAL, "access": {"method": "aloha", "max_retries": 3}}, "radio.access.max_retries"),
     ({**SIGNAL, "access": {"method": "none", "cca_threshold_dbm": -70.0}}, "radio.access.cca_threshold_dbm"),
     ({"range_m": 2.0, "queue_lifetime_s": 0.5}, "radio.queue_lifetime_s"),
