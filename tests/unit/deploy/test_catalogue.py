@@ -257,12 +257,3 @@ def test_metrics_of_packages_are_listed_and_described_also_if_they_do_not_import
     text = called(monkeypatch, capsys, "describe", "east")[1]
     assert all(part in text for part in ('metric = "east"', "from_m = 0.0", "sky_metrics:East", "at least -9"))
     assert called(monkeypatch, capsys, "describe", "west")[0] == 0
-
-
-def test_commands_list_and_describe_print_entries(monkeypatch, capsys):
-    code, out, errors = called(monkeypatch, capsys, "list")
-    assert (code, errors) == (0, "")
-    assert all(f"{kind.name} " in out for kind in KINDS)
-    assert "probability that a packet" in called(monkeypatch, capsys, "describe", "radio.loss")[1]
-    for name in ("list", "describe", "new"):
-        assert f" swarmwire {name} " in called(monkeypatch, capsys, name, "--help")[1]

@@ -37,16 +37,6 @@ def test_report_of_no_such_response_writes_nothing(report, campaign):
     assert not (campaign / "report.html").exists()
 
 
-def test_report_of_a_campaign_lies_in_its_folder_with_its_figures(report, campaign):
-    code, out, _ = report(campaign, "--response", "order")
-    assert code == 0
-    figures = sorted(path.name for path in (campaign / "figures").iterdir())
-    written = f"written: {campaign}/figures ({len(figures) // 2} figures, as SVG and PDF)"
-    assert out.splitlines() == [f"written: {campaign}/report.html", written]
-    assert {name.rpartition(".")[2] for name in figures} == {"svg", "pdf"}
-    assert "made-up order.final" in (campaign / "report.html").read_text(encoding="utf-8")
-
-
 def test_report_of_another_name_has_separate_figures(report, campaign, tmp_path):
     code, out, _ = report(campaign, "--response", "order", "--to", tmp_path / "order.html")
     assert code == 0
@@ -106,15 +96,6 @@ def test_comparison_is_printed_and_written(monkeypatch, capsys, tmp_path, folder
     ]
     assert f"written: {to}" in out
     assert len(to.read_text().splitlines()) == 4
-
-
-def test_points_are_chosen_by_value(monkeypatch, capsys, folders):
-    code, out, _ = called(monkeypatch, capsys, "compare", *(f"{folder}@radio.loss=0.2" for folder in folders))
-    assert code == 0
-    assert "radio.loss=0.4" not in out
-    code, out, _ = called(monkeypatch, capsys, "compare", f"{folders[0]}@radio.loss=0", f"{folders[0]}@radio.loss=0.4")
-    assert code == 0
-    assert "A: radio.loss=0; B: radio.loss=0.4" in out
 
 
 @pytest.mark.parametrize("arguments", [("--response", "ordr"), ("--to", "x.txt")])

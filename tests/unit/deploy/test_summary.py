@@ -2,7 +2,6 @@
 
 import json
 
-import pytest
 from scipy.stats import binomtest
 
 from swarmwire.deploy import Percentiles, run
@@ -58,27 +57,6 @@ def test_without_a_radio_there_is_no_radio_part(tmp_path):
     assert result.radio is None
     assert result.metrics["order"].mean is not None
     assert result.metrics["components"].mean is None
-
-
-def test_terminal_shows_progress_metrics_and_next_commands(tmp_path, monkeypatch, capsys):
-    code, out, _ = called(monkeypatch, capsys, "run", LOSSY, "--set", "duration_s=2", "--out", tmp_path / "run")
-    assert code == 0
-    for text in ("tick 20/20", "link_pdr ", "order", "swarmwire view", "--to film.gif"):
-        assert text in out
-
-
-@pytest.mark.parametrize("call", [["--help"], ["run", "--help"], ["check", "--help"]])
-def test_help_teaches(call, monkeypatch, capsys):
-    code, out, _ = called(monkeypatch, capsys, *call)
-    assert code == 0
-    assert "scenario" in out.lower()
-
-
-def test_check_says_what_is_in_a_good_scenario(monkeypatch, capsys):
-    code, out, _ = called(monkeypatch, capsys, "check", LOSSY)
-    assert code == 0
-    for text in ("20 x epuck", "flock", "120 s", "10 Hz"):
-        assert text in out
 
 
 def test_schema_is_json_schema_with_units_and_bounds(monkeypatch, capsys):
