@@ -138,28 +138,14 @@ def test_event_is_passed_on_unchanged_and_answered_with_its_number(client, contr
 
 
 @pytest.mark.parametrize(
-    "order",
-    [
-        {},
-        [],
-        {"do": "format"},
-        {"do": "step", "n": 0},
-        {"do": "step", "n": 1.5},
-        {"do": "speed", "factor": -1},
-        {"do": "speed"},
-        {"do": "pause", "now": True},
-        {"do": "event", "event": "kill"},
-        {"do": "end", "number": -1},
-    ],
-)
-def test_invalid_order_is_refused_and_does_nothing(client, control, order):
-    assert client.post("/secret/do", json=order).status_code == 422
-    assert not control.asked
-
-
-@pytest.mark.parametrize(
     ("order", "key"),
     [
+        *((json.dumps(order), "") for order in ({}, [], {"do": "format"})),
+        *((json.dumps({"do": "step", "n": n}), "step.n") for n in (0, 1.5)),
+        *((json.dumps({"do": "speed", **factor}), "speed.factor") for factor in ({"factor": -1}, {})),
+        (json.dumps({"do": "pause", "now": True}), "pause.now"),
+        (json.dumps({"do": "event", "event": "kill"}), "event.event"),
+        (json.dumps({"do": "end", "number": -1}), "end.number"),
         ('{"do": "speed", "factor": NaN}', "speed.factor"),
         ('{"do": "speed", "factor": -Infinity}', "speed.factor"),
         ('{"do": "speed", "factor": 1e999}', "speed.factor"),

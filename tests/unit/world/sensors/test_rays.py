@@ -9,10 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Light
-from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
+from swarmwire.comms.robot.bodies.body import Body, load_body
 from swarmwire.comms.robot.sensors.rays import InfraredSpec, ProximitySpec, ResponseCurve
 from swarmwire.comms.robot.sensors.scan import ScanSpec
 from swarmwire.world.sensors.pipeline import SensorPipeline
@@ -147,12 +146,3 @@ def test_scan_reads_range_min_when_too_near_and_inf_beyond() -> None:
 def test_lost_scan_ray_reads_inf() -> None:
     readings = scanned([[0.0, 0.0, 0.0]] * 1, ScanSpec(rays=360, range_m=3.5, drop_out=0.5), size_m=4.0)
     assert 0.4 < np.mean(np.isinf(readings)) < 0.6
-
-
-@pytest.mark.parametrize(
-    ("key", "value"), [("rays", 0), ("rays", 2.5), ("span_deg", 400.0), ("range_min_m", 3.5), ("at_m", 0.1)]
-)
-def test_impossible_scanner_is_refused(key: str, value: float) -> None:
-    table = {"rays": 360, "range_m": 3.5, key: value}
-    with pytest.raises(BadInput, match=rf"^mine.toml: sensors\.scan\.{key}: expected "):
-        body_from({"like": "footbot", "sensors": {"scan": table}}, "mine.toml")

@@ -15,7 +15,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import normal, purpose, uniform
 from swarmwire.comms.base.plugins import NotLoaded
 from swarmwire.comms.observe.truth import Group, Light
-from swarmwire.comms.robot.bodies.body import Body, load_body
+from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
 from swarmwire.comms.robot.sensors import SENSOR_SPECS, Sensors
 from swarmwire.comms.robot.sensors.camera import CameraSpec
 from swarmwire.comms.robot.sensors.imu import ImuSpec
@@ -36,6 +36,7 @@ from swarmwire.world.sensors.loading import sensor_of, truth_of
 from swarmwire.world.sensors.rays import ProximitySensor
 from swarmwire.world.sensors.sensor import BuiltInSensor, Scene
 from swarmwire.world.world import World
+from tests.support.refusals import refused_input
 from tests.support.world.scenes import SENSORS, commanded, posed, read, scene, staged
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
@@ -301,6 +302,27 @@ def test_sensor_spec_without_a_truth_is_refused() -> None:
         truth_of(Lost)
     with pytest.raises(TypeError, match="expected a BuiltInSensor"):
         truth_of(Other)
+
+
+SHEET_FAULTS: dict[str, list[dict[str, Any]]] = {  # by the key below sensors
+    **{
+        f"scan.{key}": [{"rays": 360, "range_m": 3.5, key: value} for value in values]
+        for key, values in {"rays": [0, 2.5], "span_deg": [400.0], "range_min_m": [3.5], "at_m": [0.1]}.items()
+    },
+    **{
+        f"battery.{key}": [{"capacity_wh": 1.0, key: value} for value in values]
+        for key, values in {"capacity_wh": [-1.0, 0], "idle_w": [-0.1], "empty_v": [4.5], "start": [1.5]}.items()
+    },
+    "ground.points_m[1]": [{"points_m": [[0.0, 0.0], [0.03, 0.09]]}],  # not under the body
+    "ground.points_m[0]": [{"points_m": [[0.0, 0.0, 0.0]]}],
+    "ground.points_m": [{"points_m": []}],
+}
+
+
+@pytest.mark.parametrize(("key", "table"), [(key, table) for key, tables in SHEET_FAULTS.items() for table in tables])
+def test_impossible_sensor_is_refused_with_its_key(key: str, table: dict[str, Any]) -> None:
+    with refused_input("mine.toml", f"sensors.{key}"):
+        body_from({"like": "footbot", "sensors": {key.partition(".")[0]: table}}, "mine.toml")
 
 
 @pytest.mark.parametrize("name", NAMES)
