@@ -15,6 +15,7 @@ from swarmwire.comms.base.errors import BadInput, Interrupted
 from swarmwire.deploy.cli.display.robots import progress_watcher
 from swarmwire.deploy.cli.robots import run_work
 from swarmwire.deploy.robots.archives import ArchiveEntry, name_of, write_archive
+from swarmwire.deploy.robots.deploy import release_contents
 from swarmwire.deploy.robots.fleet import Fleet, Host, hosts_of
 from swarmwire.deploy.robots.fleet_file import FleetTable, RobotTable, read_fleet
 from swarmwire.deploy.robots.host_side.messages import HostFacts
@@ -50,8 +51,6 @@ def test_example_fleet_is_read():
 
 
 def test_example_agent_fits_its_robots(tmp_path):
-    from swarmwire.deploy.robots.deploy import release_contents
-
     text = EXAMPLE.read_text().replace('certificates = "certs"', "insecure = true")
     (tmp_path / "fleet.toml").write_text(text)
     (tmp_path / "shy.py").write_bytes((EXAMPLE.parent / "shy.py").read_bytes())
@@ -79,8 +78,6 @@ BEHAVIOURS = "swarmwire.agent.behaviours"
     ],
 )
 def test_crazyflie_and_crazyradio_belong_to_one_agent(tmp_path, other, at, expected):
-    from swarmwire.deploy.robots.deploy import release_contents
-
     defaults = {"user": "pi", "agent": f"{BEHAVIOURS}:Avoidance", "body": "crazyflie.toml"}
     (tmp_path / "crazyflie.toml").write_bytes((ROOT / "scenarios" / "robots" / "crazyflie.toml").read_bytes())
     robots = {
@@ -101,8 +98,6 @@ def test_crazyflie_and_crazyradio_belong_to_one_agent(tmp_path, other, at, expec
 
 
 def test_driver_at_loopback_is_another_robot_on_each_machine(tmp_path):
-    from swarmwire.deploy.robots.deploy import release_contents
-
     driver = {"name": "epuck2", "address": "127.0.0.1:1000"}
     defaults = {**LEAST["defaults"], "agent": f"{BEHAVIOURS}:Avoidance", "driver": driver}
     robots = {name: {"address": at} for name, at in (("a", "10.0.0.1"), ("b", "10.0.0.2"), ("c", "10.0.0.1"))}
@@ -173,24 +168,24 @@ def test_robot_settings_name_files_in_their_own_folder(tmp_path):
     assert tomllib.loads(tomli_w.dumps(settings)) == settings
 
 
+ROBOT_FAULTS: dict[str, list[Any]] = {  # of robot a, by the key below robots.a
+    "": [3],
+    ".address": [{}, {"address": 3}, {"address": ""}],
+    ".adress": [{"adress": "h"}],
+    ".port": [{"address": "h", "port": 0}, {"address": "h", "port": True}],
+    ".groups": [{"address": "h", "groups": ["rad"]}],
+    ".groups[0]": [{"address": "h", "groups": [1]}],
+}
+
+
 @pytest.mark.parametrize(
     ("changed", "key"),
     [
-        ({"swarm": None}, "swarm"),
-        ({"swarm": "a/*"}, "swarm"),
+        *(({"robots": {"a": robot}}, f"robots.a{key}") for key, robots in ROBOT_FAULTS.items() for robot in robots),
+        *(({"robots": {name: {"address": "h"}}}, f"robots.{name}") for name in ("a b", "env")),
+        *(({"swarm": swarm}, "swarm") for swarm in (None, "a/*")),
         ({"robot": {}}, "robot"),
         ({"robots": {}}, "robots"),
-        ({"robots": {"a b": {"address": "h"}}}, "robots.a b"),
-        ({"robots": {"env": {"address": "h"}}}, "robots.env"),
-        ({"robots": {"a": {}}}, "robots.a.address"),
-        ({"robots": {"a": {"adress": "h"}}}, "robots.a.adress"),
-        ({"robots": {"a": 3}}, "robots.a"),
-        ({"robots": {"a": {"address": 3}}}, "robots.a.address"),
-        ({"robots": {"a": {"address": ""}}}, "robots.a.address"),
-        ({"robots": {"a": {"address": "h", "port": 0}}}, "robots.a.port"),
-        ({"robots": {"a": {"address": "h", "port": True}}}, "robots.a.port"),
-        ({"robots": {"a": {"address": "h", "groups": ["rad"]}}}, "robots.a.groups"),
-        ({"robots": {"a": {"address": "h", "groups": [1]}}}, "robots.a.groups[0]"),
         ({"robots": {"a": {"address": "h"}, "b": {"address": "h", "python": "p"}}}, "robots.b"),
         ({"defaults": {"user": "pi", "address": "h"}}, "defaults.address"),
         ({"groups": {"red": {"groups": ["blue"]}}}, "groups.red.groups"),
