@@ -252,11 +252,6 @@ def test_session_info_round_trips_with_the_free_robots(roster: Roster) -> None:
     assert free(roster)["flock"] == tuple(f"flock-{row}" for row in FLOCK)
 
 
-def test_owner_of_robots_follows_the_cuts(roster: Roster) -> None:
-    assigned(roster, "a", names=["flock-4", "lone-3"])
-    assigned(roster, "b", robots=2)
-    players = np.array([slot.runner or "" for slot in roster._allocations])
-    assert players[roster._allocations.owner].tolist() == ["b", "b", "", "a", "a", "", "", ""]
 
 
 @pytest.mark.parametrize("fields", [{"names": ["\x1b[2J\n"]}, {"names": ["x" * 10**5]}, {"version": "\x1b" * 10**5}])
