@@ -250,6 +250,8 @@ def test_metrics_of_packages_are_listed_and_described_also_if_they_do_not_import
     install(tmp_path, "sky_metrics", {"east": "East"})
     install(tmp_path, "fog_metrics", {"west": "East"}, code="raise ValueError('fog')")
     monkeypatch.syspath_prepend(tmp_path)
+    kinds = called(monkeypatch, capsys, "list")[1]
+    assert all(f"{kind.name} " in kinds for kind in KINDS)
     lines = called(monkeypatch, capsys, "list", "metrics")[1].splitlines()
     told = {line.split()[0]: line for line in lines}
     assert "plug-in" in told["east"]

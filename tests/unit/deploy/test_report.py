@@ -95,6 +95,8 @@ def test_comparison_is_printed_and_written(monkeypatch, capsys, tmp_path, folder
         ["order.final", f"radio.loss={loss}"] for loss in ("0", "0.2", "0.4")
     ]
     assert f"written: {to}" in out
+    points = (f"{folders[0]}@radio.loss={loss}" for loss in ("0", "0.4"))
+    assert "A: radio.loss=0; B: radio.loss=0.4" in called(monkeypatch, capsys, "compare", *points)[1]
     assert len(to.read_text().splitlines()) == 4
 
 

@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swarmwire.comms.base.errors import SwarmwireError
+from swarmwire.deploy import repeat
 from swarmwire.deploy.cli.actions.inject import robot_selection
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.live.remote_control import Refused
@@ -128,6 +129,7 @@ def test_paused_means_that_the_tick_stands_still_and_steps_are_so_many_ticks(tmp
         at_tick(control, 6)
         paused = {control.status()["tick"] for _ in range(20)}
         assert paused == {6}
+        assert "100 times" in control.speed(100)["done"]
         control.resume()
         until(lambda: simulation.tick > 6)
     assert simulation.result.ended == "duration"
@@ -166,6 +168,7 @@ def test_live_event_takes_effect_next_tick_and_is_recorded_before(tmp_path):
         (6, "kill", True, 0.3),
         (6, "ramp", True, 0.5),
     ]
+    assert repeat(tmp_path / "run").same
 
 
 @pytest.mark.parametrize(
@@ -209,8 +212,10 @@ def ctl(*arguments: object) -> str:
     [
         (["kill", "3", "4"], "ROBOTS"),
         (["kill", "3x"], "ROBOTS"),
+        (["jam", "--at", "-1,0"], "do"),
         (["jam", "--at", "here"], "--at"),
         (["set", "loss"], "KEY=VALUE"),
+        (["set", "loss=2"], "to"),
         (["speed", "fast"], "FACTOR"),
         (["event", "kill"], "event"),
         (["event", "3"], "event"),
