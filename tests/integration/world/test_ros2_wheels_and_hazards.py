@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.robot.bodies.body import load_body
-from tests.support.clocks import until
-from tests.support.comms.protocols.ros2 import independent
-from tests.support.world.gateways import TICK_NS, ros_node
+from tests.support.world.gateways import ros_node
 
 # pycdr2 has arrays for types that are lists in fact:
 # pyright: reportGeneralTypeIssues=false
 
 HAZARDS = "irobot_create_msgs/msg/HazardDetectionVector"
 BUMP, CLIFF = 1, 2
-TICK_S = TICK_NS / 1e9
 
 
 def turtlebot4_readings(**fields) -> dict[str, np.ndarray]:
@@ -60,33 +57,6 @@ def test_joint_positions_follow_the_rolled_distance(body, joints):
         assert state.position == pytest.approx([-0.05 / radius_m, 0.1 / radius_m])
         still = node.message("flock_0/joint_states", "sensor_msgs/msg/JointState", rolling(5))
         assert (still.position, still.velocity) == ([0.0, 0.0], [0.0, 0.0])
-
-
-def test_joint_velocity_is_that_between_the_last_two_readings():
-    with ros_node(load_body("turtlebot4")) as node:
-        node.publish(rolling(0))
-        samples = {topic: node.subscribe(f"flock_1/{topic}") for topic in ("joint_states", "wheel_vels", "stop_status")}
-        until(lambda: (node.publish(rolling(node.tick + 1)), all(samples.values()))[1])
-        state, vels = (
-            independent.BY_KIND[kind].deserialize(samples[topic][-1].payload.to_bytes())
-            for topic, kind in (
-                ("joint_states", "sensor_msgs/msg/JointState"),
-                ("wheel_vels", "irobot_create_msgs/msg/WheelVels"),
-            )
-        )
-        expected = np.array([-0.01, 0.02]) / TICK_S / 0.03575
-        assert state.velocity == pytest.approx(expected)
-        assert (vels.velocity_left, vels.velocity_right) == pytest.approx(tuple(expected))
-        stop = independent.StopStatus.deserialize(samples["stop_status"][-1].payload.to_bytes())
-        assert not stop.is_stopped
-
-
-def test_wheel_ticks_per_turn_equal_the_create_3_encoder():
-    with ros_node(load_body("turtlebot4")) as node:
-        turn_m = 2 * pi * 0.03575
-        turned = turtlebot4_readings(**{"odometry.left_m": np.array([0, 10 * turn_m])})
-        ticks = node.message("flock_1/wheel_ticks", "irobot_create_msgs/msg/WheelTicks", turned)
-        assert (ticks.ticks_left, ticks.ticks_right) == (5088, 0)
 
 
 def test_scan_of_a_turned_scanner_fits_its_static_frame():

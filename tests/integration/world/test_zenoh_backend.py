@@ -17,10 +17,8 @@ import psutil
 import pytest
 
 from swarmwire.agent import runner
-from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.comms.base.clock import WallClock, to_ns
 from swarmwire.comms.base.errors import AgentFailed, BadInput, Interrupted, RunnerLost
-from swarmwire.comms.robot.packets import ReceivedPackets
 from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.assignment import Assignment
@@ -34,7 +32,7 @@ from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.registry import OnLoss
 from swarmwire.world.backends.runner_reports import RunnerEvent, RunnerHealth
 from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
-from tests.support.agent.hosts import SILENCE, assignment, group, one_group, plain, received_from, spec
+from tests.support.agent.hosts import SILENCE, assignment, group, one_group, spec
 from tests.support.agent.processes import thread_server
 from tests.support.clocks import TIMEOUT_S, until
 
@@ -116,35 +114,6 @@ def act(backend: LockstepBackend, tick: int, rows: list[int]) -> Actions:
     return backend.act(tick, one_group(tick, rows), SILENCE)
 
 
-def three_ticks(backend: LockstepBackend, rows: list[int]) -> None:
-    for tick in range(3):
-        act(backend, tick, rows)
-
-
-def on_receive(before: Actions | None) -> ReceivedPackets:
-    return SILENCE if before is None else received_from(before.sent, ROWS)
-
-
-@pytest.mark.parametrize("rows", [[ROWS], [[0, 2, 4], [1, 3]], [[row] for row in ROWS]], ids=["one", "two", "each"])
-def test_runners_act_exactly_like_the_local_backend(endpoint: str, rows: list[list[int]]) -> None:
-    local = LocalBackend(assignment(group(spec("Chatter"), ROWS)))
-    local.start()
-    before: Actions | None = None
-    names = [f"r{i}" for i in range(len(rows))]
-    with hosts(endpoint, names) as started:
-        with opened(endpoint, parts("Chatter", *rows)) as backend:
-            backend.start()
-            for tick in range(6):
-                acting = [row for row in ROWS if (row + tick) % 4]  # robots leave and return
-                expected = local.act(tick, one_group(tick, acting), on_receive(before))
-                got = backend.act(tick, one_group(tick, acting), on_receive(before))
-                assert plain(got) == plain(expected)
-                assert len(expected.sent) == 3 * len(acting)
-                before = expected
-            assert not backend.counts()
-        assert [host.wait(10.0) for host in started] == [0] * len(rows)  # without a signal
-
-
 def test_foreign_frames_are_counted_and_the_run_continues(endpoint: str) -> None:
     keys = Keys(RUN)
     with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as backend:
@@ -177,58 +146,14 @@ def test_foreign_frames_are_counted_and_the_run_continues(endpoint: str) -> None
         assert set(backend.counts()) == names | {"bad_join", "refused_join"}
 
 
-def test_runner_that_vanishes_is_lost_with_its_robots(endpoint: str) -> None:
-    slots = parts("Vanishing", [0, 3, 4], [1, 2])  # the compass of robots 0 and 4 is above 0 in tick 2
-    with hosts(endpoint, ["a", "b"], "Vanishing"), opened(endpoint, slots) as backend:
-        backend.start()
-        with pytest.raises(RunnerLost) as caught:
-            three_ticks(backend, ROWS)
-        assert caught.value.robots == "flock-0, flock-3, flock-4"
-        assert caught.value.runner in {"a", "b"}
-        assert caught.value.reason == "its process ended with exit code 3"
-
-
-def test_failing_agent_ends_the_run_with_its_traceback(endpoint: str) -> None:
-    with hosts(endpoint, ["a", "b"], "Failing") as started:
-        with opened(endpoint, parts("Failing", [0, 1], [2, 3])) as backend:
-            backend.start()
-            with pytest.raises(AgentFailed) as caught:
-                three_ticks(backend, [0, 1, 2, 3])
-        assert [host.wait(10.0) for host in started] == [0, 0]
-    assert caught.value.robots == "flock-0"
-    assert "NotDeclared" in caught.value.traceback
-    assert "print(robot.proximity)" in caught.value.traceback
-
-
-def test_agent_without_a_constructor_ends_the_run_at_its_start(endpoint: str) -> None:
-    with thread(endpoint, "r0") as ends, opened(endpoint, parts("Unmade", [0, 1])) as backend:
-        with pytest.raises(AgentFailed) as caught:
+@pytest.mark.parametrize(("agent", "reason"), [("Unmade", "no memory left"), ("Nowhere", "no such name: 'Nowhere'")])
+def test_agent_that_cannot_be_made_ends_the_run_at_its_start(endpoint: str, agent: str, reason: str) -> None:
+    with thread(endpoint, "r0") as ends, opened(endpoint, parts(agent, [0, 1])) as backend:
+        with pytest.raises(AgentFailed, match=reason) as caught:
             backend.start()
         backend.close()
         assert ends.get(timeout=20.0) is None
     assert caught.value.robots == "flock-0, flock-1"
-    assert "no memory left" in caught.value.traceback
-
-
-def test_missing_agent_class_ends_the_run_with_the_reason(endpoint: str) -> None:
-    fails = pytest.raises(AgentFailed, match="no such name: 'Nowhere'")
-    with thread(endpoint, "r0"), opened(endpoint, parts("Nowhere", [0])) as backend, fails:
-        backend.start()
-
-
-def test_runner_beyond_the_robots_is_refused(endpoint: str) -> None:
-    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as backend:
-        backend.start()
-        with thread(endpoint, "r1") as ends:
-            tick = 0
-            while "refused_join" not in backend.counts():
-                act(backend, tick, ROWS)
-                tick += 1
-            end = ends.get(timeout=20.0)
-        act(backend, tick, ROWS)
-        backend.close()
-    assert isinstance(end, RunnerLost)
-    assert end.reason == "all robots are taken"
 
 
 def test_runner_may_start_before_its_world(endpoint: str) -> None:
@@ -309,73 +234,10 @@ def test_backend_may_be_closed_twice_and_before_it_is_opened(endpoint: str) -> N
     backend.close()
 
 
-def test_runners_leave_when_the_world_is_killed(endpoint: str) -> None:
-    """A world in another process, killed by a signal."""
-    program = f"""
-from swarmwire.comms.base.clock import WallClock, to_ns
-from swarmwire.world.backends.lockstep import Lockstep
-from swarmwire.world.backends.zenoh_backend import LockstepBackend
-from tests.integration.world.test_zenoh_backend import RUN, parts
-
-backend = LockstepBackend({endpoint!r}, RUN, Lockstep(parts("Counter", [0])), 60.0, WallClock())
-backend.start()
-print("started", flush=True)
-input()
-"""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    with subprocess.Popen(
-        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment
-    ) as world:
-        try:
-            with thread(endpoint, "r0") as ends:
-                assert world.stdout is not None
-                assert world.stdout.readline() == b"started\n"
-                world.kill()
-                assert ends.get(timeout=20.0) is None
-        finally:
-            world.kill()
-
-
 def process_of(host: "subprocess.Popen[bytes]") -> psutil.Process:
     """The agent process of a host: its fork server's child."""
     (server,) = psutil.Process(host.pid).children()
     return server.children()[0]
-
-
-def kill_one(host: "subprocess.Popen[bytes]") -> None:
-    process = process_of(host)
-    process.kill()
-    process.wait(20.0)
-
-
-def test_successor_of_a_lost_runner_has_fresh_agents(endpoint: str) -> None:
-    with ExitStack() as later, hosts(endpoint, ["a", "b"]) as started:
-        hooks = BackendHooks(lost=lambda _: (later.enter_context(thread(endpoint, "c")), None)[1])
-        backend = backend_of(endpoint, parts("Counter", [0, 1], [2]), "wait", hooks)
-        later.callback(backend.close)
-        backend.start()
-        for tick in range(2):
-            act(backend, tick, [0, 1, 2])
-        kill_one(started[0])
-        got = act(backend, 2, [0, 1, 2])
-        steps = dict(zip(got.rows.tolist(), got.linear_mps.tolist(), strict=True))
-        assert steps in ({0: 1.0, 1: 1.0, 2: 3.0}, {0: 3.0, 1: 3.0, 2: 1.0})
-        assert backend.counts() == {"runners_lost": 1, "runners_joined_late": 1}
-        backend.close()
-
-
-def test_wait_for_robots_without_a_runner_is_announced_once(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(zenoh_backend, "ANNOUNCE_S", 0.0)
-    with hosts(endpoint, ["a", "b"]) as started:
-        announced: list[tuple[str, ...]] = []
-        checks = itertools.count()
-        hooks = BackendHooks(stopped=lambda: bool(announced) and next(checks) > 3, waiting=announced.append)
-        with closing(backend_of(endpoint, parts("Counter", [0], [1]), "wait", hooks)) as backend:
-            backend.start()
-            kill_one(started[0])
-            with pytest.raises(Interrupted):
-                act(backend, 0, [0, 1])
-    assert announced in ([("flock-0",)], [("flock-1",)])
 
 
 class LeapingClock(WallClock):
@@ -428,46 +290,43 @@ def test_freeze_of_the_world_does_not_count_for_the_timeout(endpoint: str) -> No
             backend.close()
 
 
-class Events:
-    """Events and endpoints that a backend reported."""
-
-    def __init__(self) -> None:
-        self.changes: list[RunnerEvent] = []
-        self.free: list[tuple[str, ...]] = []
-        self.endpoints: tuple[str, ...] = ()
-
-    def changed(self, change: RunnerEvent, free: tuple[str, ...]) -> None:
-        self.changes.append(change)
-        self.free.append(free)
-
-    def opened(self, endpoints: tuple[str, ...]) -> None:
-        self.endpoints = endpoints
-
-
-def backend_at(endpoint: str, events: Events, limits: JoinLimits) -> LockstepBackend:
-    slots = [assignment(group(spec("Counter"), [0, 1, 2]))]
-    hooks = BackendHooks(changed=events.changed, opened=events.opened)
-    return LockstepBackend(
-        endpoint, RUN, Lockstep(slots, "stand", JoinPolicy(OFFER, True, limits=limits)), 20.0, WallClock(), hooks
-    )
+def test_wait_for_robots_without_a_runner_is_announced_once(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zenoh_backend, "ANNOUNCE_S", 0.0)
+    with hosts(endpoint, ["a", "b"]) as started:
+        announced: list[tuple[str, ...]] = []
+        checks = itertools.count()
+        hooks = BackendHooks(stopped=lambda: bool(announced) and next(checks) > 3, waiting=announced.append)
+        with closing(backend_of(endpoint, parts("Counter", [0], [1]), "wait", hooks)) as backend:
+            backend.start()
+            process = process_of(started[0])
+            process.kill()
+            process.wait(20.0)
+            with pytest.raises(Interrupted):
+                act(backend, 0, [0, 1])
+    assert announced in ([("flock-0",)], [("flock-1",)])
 
 
 def test_runner_that_is_not_ready_in_time_loses_its_robots(endpoint: str) -> None:
-    events, keys = Events(), Keys(RUN)
-    with closing(backend_at(endpoint, events, JoinLimits(join_s=0.2))) as backend:
+    changes: list[RunnerEvent] = []
+    free: list[set[str]] = []
+    endpoints: list[tuple[str, ...]] = []
+    hooks = BackendHooks(
+        changed=lambda change, names: (changes.append(change), free.append({*names})), opened=endpoints.append
+    )
+    policy = JoinPolicy(OFFER, True, limits=JoinLimits(join_s=0.2))
+    lockstep = Lockstep(parts("Counter", [0, 1, 2]), "stand", policy)
+    keys = Keys(RUN)
+    with closing(LockstepBackend(endpoint, RUN, lockstep, 20.0, WallClock(), hooks)) as backend:
         backend.open()
-        assert events.endpoints == (endpoint,)
         with closed_after(open_runner(endpoint)) as idler:
-            queries = [
-                idler.get(keys.session_info("idler")),
-                idler.get(keys.join("idler"), payload=JoinRequest(names=("flock-1",)).encode()),
-            ]
-            until(lambda: (backend._handle_arrived(), events.changes)[1])
-            replies = [next(iter(replies)) for replies in queries]
-    assert all(reply.ok is not None for reply in replies)
-    session_info = SessionInfo.decode(replies[0].ok.payload.to_bytes()) if replies[0].ok else None
-    assert session_info is not None
-    assert session_info.groups[0].robots == 3
+            session_info = idler.get(keys.session_info("idler"))
+            joined = idler.get(keys.join("idler"), payload=JoinRequest(names=("flock-1",)).encode())
+            until(lambda: (backend._handle_arrived(), changes)[1])
+            (told,), (assigned,) = session_info, joined
+    assert endpoints == [(endpoint,)]
+    assert assigned.ok is not None
+    assert told.ok is not None
+    assert SessionInfo.decode(told.ok.payload.to_bytes()).groups[0].robots == 3
     reason = "its agents were not ready within 0.2 s"
-    assert events.changes == [RunnerEvent("lost", "idler", ("flock-1",), -1, reason)]
-    assert [sorted(free) for free in events.free] == [["flock-0", "flock-1", "flock-2"]]
+    assert changes == [RunnerEvent("lost", "idler", ("flock-1",), -1, reason)]
+    assert free == [{"flock-0", "flock-1", "flock-2"}]
