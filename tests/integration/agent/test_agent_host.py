@@ -8,7 +8,6 @@ from pathlib import Path
 import psutil
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.sessions import PRIVATE
@@ -19,35 +18,6 @@ from tests.support.clocks import until
 
 END = frames.encode("end", -1, {})
 TIMEOUT_S = 60.0
-LANES = """
-from swarmwire.agent import PerRobot, Robots, Memory, VectorAgent, parameter
-
-class Lanes(VectorAgent):
-    lane: PerRobot[int]
-    speed_mps: PerRobot[float] = parameter(0.02, help="straight ahead")
-
-    def step(self, robots: Robots, memory: Memory) -> None:
-        robots.drive(self.speed_mps, 0.5 * self.lane)
-"""
-SCENARIO = """
-format = 1
-name = "lanes"
-duration_s = 1.0
-arena = { size_m = [4.0, 4.0] }
-
-[robots.first]
-body = "epuck"
-count = 2
-agent = "lanes.py:Lanes"
-params = { lane = 1 }
-
-[robots.lanes]
-body = "epuck"
-count = 4
-agent = "lanes.py:Lanes"
-act_every_ticks = 2
-params = { lane = [0, 1, 2, 3] }
-"""
 
 FORKS = """
 {before}
@@ -197,32 +167,11 @@ def test_processes_beyond_the_limit_of_open_files_are_refused() -> None:
     assert "--processes: expected fewer than 40 processes, or a limit above 30 open files" in done.stderr
 
 
-@pytest.fixture
-def scenario(tmp_path):
-    (tmp_path / "lanes.py").write_text(LANES)
-    (tmp_path / "lanes.toml").write_text(SCENARIO)
-    return tmp_path / "lanes.toml"
-
-
 class Commands(Observer):
     """An observer of the last commands."""
 
     def see(self, truth):
         self.last = truth.command.copy()
-
-
-def test_per_robot_parameters_are_equal_in_every_layout(scenario):
-    seen, expected = Commands(), [0.5, 0.5, 0.0, 0.5, 1.0, 1.5] * 2
-    local = run(scenario, seeds=[1, 2], observers=[seen])
-    assert seen.last[:, 1] == pytest.approx(expected)
-    for runners in (3, "per-robot"):
-        other = run(scenario, seeds=[1, 2], runners=runners, observers=[seen])
-        assert other.trajectory_sha256 == local.trajectory_sha256
-
-
-def test_per_robot_list_of_the_wrong_length_is_refused(scenario):
-    with pytest.raises(BadInput, match=r"robots.lanes.params.lane: expected .* 4 robots, got a list of 3"):
-        run(scenario, overrides=["robots.lanes.params.lane=[1, 2, 3]"])
 
 
 FAULTY = """

@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 import psutil
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Result, run
@@ -25,6 +24,7 @@ from swarmwire.deploy.runs.live_address import Announcement, runs_folder
 from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from tests.support.agent import hostile
 from tests.support.clocks import until
+from tests.support.refusals import refused_input
 
 AGENTS = Path(hostile.__file__)
 TIMEOUT_S = 60.0  # timeout of runners: the reason of ends that are not noticed at once
@@ -129,15 +129,12 @@ def test_process_whose_child_holds_its_socket_is_noticed_at_once(attacked: Hosti
     assert "ended with exit code 3" in attacked.lost["leaves a child"]
     assert "closed its socket" in attacked.lost["closes its socket"]
 
-    def left() -> list[psutil.Process]:
-        processes = [
-            process for process in psutil.process_iter(["cmdline"]) if hostile.MARK in (process.info["cmdline"] or ())
-        ]
-        return [
-            process for process in processes if process.create_time() >= attacked.began_s - 1.0
-        ]  # not from an earlier test run
+    def is_left(process: psutil.Process) -> bool:
+        """Whether it is of this run, not of an earlier one."""
+        marked = hostile.MARK in (process.info["cmdline"] or ())
+        return marked and process.create_time() >= attacked.began_s - 1.0
 
-    until(lambda: not left())
+    until(lambda: not any(map(is_left, psutil.process_iter(["cmdline"]))))
 
 
 @pytest.fixture(scope="module")
@@ -201,5 +198,5 @@ def test_system_without_namespaces_refuses_isolation_but_has_no_network() -> Non
 
 
 def test_isolation_without_processes_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="isolate: expected runners"):
+    with refused_input("isolate"):
         run(AGENTS.parents[3] / "scenarios" / "flocking.toml", isolate=True)
