@@ -289,22 +289,14 @@ def test_garbage_ends_the_connection_and_a_new_one_works(rig: OwnWireRig, link: 
 
 
 @ON_OWN_WIRE
+@pytest.mark.parametrize(("hang_up", "count"), [(False, "silences"), (True, "hung_up")])
 @pytest.mark.parametrize("size", [0, 1, 60])
-def test_robot_that_is_silent_within_an_answer_is_lost(rig: OwnWireRig, link: FaultyLink, size: int) -> None:
-    link.answers = CutAfter(size)
+def test_robot_that_is_silent_or_disconnects_within_an_answer_is_lost(
+    rig: OwnWireRig, link: FaultyLink, size: int, hang_up: bool, count: str
+) -> None:
+    link.answers = CutAfter(size, hang_up=hang_up)
     sense_until_lost(rig)
-    assert rig.driver.counts()["silences"] == 1
-    link.answers = Nothing()
-    until(lambda: opened(rig.driver))
-    rig.come_back(readings(0.1))
-
-
-@ON_OWN_WIRE
-@pytest.mark.parametrize("size", [0, 1, 60])
-def test_robot_that_disconnects_within_an_answer_is_lost(rig: OwnWireRig, link: FaultyLink, size: int) -> None:
-    link.answers = CutAfter(size, hang_up=True)
-    sense_until_lost(rig)
-    assert rig.driver.counts()["hung_up"] == 1
+    assert rig.driver.counts()[count] == 1
     link.answers = Nothing()
     until(lambda: opened(rig.driver))
     rig.come_back(readings(0.1))

@@ -61,21 +61,23 @@ def test_agent_run_ends_after_its_duration_with_summary_and_log(tmp_path, enviro
 
 
 @pytest.mark.parametrize(
-    ("more", "code", "reason"),
+    ("more", "reason", "last"),
     [
-        (("Driving", "--option", "gone=true"), 1, "no driver: nobody answers"),
-        (("Failing",), 1, "agent failed: RuntimeError: the third step"),
+        (("Driving", "--option", "gone=true"), "no driver: nobody answers", []),
+        (("Failing",), "agent failed: RuntimeError: the third step", ["stop", "close"]),
     ],
 )
-def test_failed_agent_run_names_the_reason_and_exits_with_1(environment, file, more, code, reason):
+def test_failed_agent_run_names_the_reason_and_needs_no_guard(environment, file, more, reason, last):
     agent, *flags = more
-    with Command(environment, "run", f"{PLAYERS}:{agent}", *robot_flags(file, "--no-guard", *flags)) as command:
-        got, out, err = command.wait()
-    assert got == code
+    with Command(environment, "run", f"{PLAYERS}:{agent}", *robot_flags(file, *PATIENT, *flags)) as command:
+        code, out, err = command.wait()
+    assert code == 1
     assert f"robot-0: ended ({reason}) after " in out
     assert "no faults" not in out
     assert reason.partition(": ")[2] in err
-    assert [deed for _, deed in deeds(file)][-1:] in ([], ["close"])
+    assert "guard" not in err
+    assert [deed for _, deed in deeds(file)][-2:] == last
+    assert len({process for process, _ in deeds(file)}) <= 1
 
 
 def test_agent_run_that_ends_with_a_lost_robot_warns(environment, file):

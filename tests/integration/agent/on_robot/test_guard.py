@@ -57,19 +57,14 @@ def robots() -> Iterator[list[Robot]]:
 
 
 @pytest.mark.parametrize(
-    ("agent", "number", "cause"),
-    [
-        ("Driving", signal.SIGKILL, "its process ended (SIGKILL)"),
-        ("Driving", signal.SIGSTOP, "no heartbeat for 0.4 s"),
-        ("Holding", None, "no heartbeat for 0.4 s"),
-        ("Vanishing", None, "its process ended (exit code 0)"),
-    ],
-    ids=["killed", "frozen", "holds the interpreter", "vanishes"],
+    ("agent", "killed", "cause"),
+    [("Driving", True, "its process ended (SIGKILL)"), ("Holding", False, "no heartbeat for 0.4 s")],
+    ids=["killed", "holds the interpreter"],
 )
-def test_guard_stops_the_motors_of_an_agent_that_is_gone(tmp_path, robots, agent, number, cause):
+def test_guard_stops_the_motors_of_an_agent_that_is_gone(tmp_path, robots, agent, killed, cause):
     robots.append(robot := Robot(tmp_path, agent, watchdog_s=0.2))
-    if number is not None:
-        os.kill(robot.agent, number)
+    if killed:
+        os.kill(robot.agent, signal.SIGKILL)
     code, _, errors = robot.command.wait()
     assert (code, robot.last()) == (1, ["open", "stop", "close"])
     assert errors.splitlines()[-1] == f"guard: the agent is gone: {cause}; the motors were stopped"
@@ -84,19 +79,10 @@ def test_guard_ends_processes_that_the_agent_started(tmp_path, robots):
     assert not any(other.is_running() for other in started)
 
 
-def test_guard_ends_processes_left_by_a_failed_agent(tmp_path, robots):
-    robots.append(robot := Robot(tmp_path, "Forking", "--param", "dies=false"))
-    code, _, errors = robot.command.wait()
-    assert (code, robot.last()) == (1, ["open", "stop", "close"])
-    assert "the fourth step" in errors
-    assert errors.splitlines()[-1].startswith("guard: the agent is gone: it closed 3 s ago, and its processes did not")
-
-
-@pytest.mark.parametrize(("sent", "code"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
-def test_signals_make_the_agent_stop_its_motors_and_close_its_log(tmp_path, robots, sent, code):
+def test_signal_makes_the_agent_stop_its_motors_and_close_its_log(tmp_path, robots):
     robots.append(robot := Robot(tmp_path, "Driving"))
-    robot.guard.send_signal(sent)
-    assert robot.command.wait()[0] == code
+    robot.guard.send_signal(signal.SIGTERM)
+    assert robot.command.wait()[0] == 0
     assert robot.last() == []
     assert [deed for _, deed in deeds(robot.file)][-2:] == ["stop", "close"]
     assert len(list(tmp_path.glob("robot-0-*/summary.json"))) == 1
@@ -108,15 +94,6 @@ def test_agent_whose_guard_is_killed_stops_its_motors(tmp_path, robots):
     until(lambda: not psutil.pid_exists(robot.agent))
     assert [deed for _, deed in deeds(robot.file)][-2:] == ["stop", "close"]
     assert '"the guard is gone"' in next(tmp_path.glob("robot-0-*/summary.json")).read_text()
-
-
-def test_agent_that_raises_stops_its_motors_without_the_guard(tmp_path, robots):
-    robots.append(robot := Robot(tmp_path, "Failing", "--rate-hz", "20"))
-    code, _, errors = robot.command.wait()
-    assert code == 1
-    assert "the third step" in errors
-    assert "guard" not in errors
-    assert robot.last() == []
 
 
 def test_guard_is_small_and_leaves_no_process_behind(tmp_path, robots):
@@ -186,16 +163,10 @@ def test_agent_that_closed_needs_no_stop(tmp_path, code):
     assert guarded(tmp_path, f"tell({RUNS!r}); tell({CLOSED!r}); sys.exit({code})") == (code, "")
 
 
-def test_standby_stops_the_motors_of_a_dead_agent_once(tmp_path, capfd):
-    assert guarded(tmp_path, f"tell({RUNS!r}); os.kill(os.getpid(), signal.SIGKILL)") == (FAILED, "stopped")
-    assert capfd.readouterr().err == (
-        "guard: the agent is gone: its process ended (SIGKILL); the motors were stopped\n"
-    )
-
-
 def test_exit_without_a_closed_message_is_a_death(tmp_path, capfd):
     assert guarded(tmp_path, f"tell({RUNS!r}); sys.exit(0)") == (FAILED, "stopped")
-    assert "its process ended (exit code 0)" in capfd.readouterr().err
+    told = "guard: the agent is gone: its process ended (exit code 0); the motors were stopped\n"
+    assert capfd.readouterr().err == told
 
 
 def test_agent_without_heartbeats_is_ended(tmp_path, capfd):

@@ -40,11 +40,8 @@ def settings(folder: Path, file: Path, more: str = "", driver: str = "") -> Path
     ("more", "driver", "key"),
     [
         ("rate_hs = 10", "", "rate_hs"),
-        ('rate_hz = "ten"', "", "rate_hz"),
         ("watchdog_s = 0.5\nmax_linear_mps = ", "", ""),
         ('[network]\nlisten = ["tls/0.0.0.0:7557"]\nca = "none.pem"', "", "network.ca"),
-        ("tracker = true", "", "network"),
-        ('robots = ["flock-1"]', "", "name"),
         ('body = "none.toml"', "", "body"),
         ("", ", gome = true", "driver.gome"),
         ("", ", gone = 3", "driver.gone"),

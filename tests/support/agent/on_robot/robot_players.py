@@ -103,13 +103,6 @@ class Holding(Doomed):
         ctypes.PyDLL(None).pause()
 
 
-class Vanishing(Doomed):
-    """Ends its process in its fourth step without a message."""
-
-    def end(self) -> None:
-        os._exit(0)
-
-
 class Painting(Agent):
     """Sets an actuator of its user's own."""
 
@@ -118,16 +111,12 @@ class Painting(Agent):
 
 
 class Forking(Doomed):
-    """Forks in its fourth step a process that keeps its files open, and dies or fails."""
-
-    dies: bool = True
+    """Forks in its fourth step a process that keeps its files open, and dies."""
 
     def end(self) -> None:
         if os.fork() == 0:
             ctypes.CDLL(None).pause()
-        if self.dies:
-            os._exit(0)
-        super().end()
+        os._exit(0)
 
 
 class Scribbling(Agent):
