@@ -63,7 +63,7 @@ def test_agent_run_ends_after_its_duration_with_summary_and_log(tmp_path, enviro
 @pytest.mark.parametrize(
     ("more", "reason", "last"),
     [
-        (("Driving", "--option", "gone=true"), "no driver: nobody answers", []),
+        (("Driving", "--option", "gone=true"), "no driver: nobody answers", ["close"]),
         (("Failing",), "agent failed: RuntimeError: the third step", ["stop", "close"]),
     ],
 )
