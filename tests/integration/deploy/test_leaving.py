@@ -13,11 +13,9 @@ from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy import Recording, Result, RunFolder, Simulation
-from swarmwire.deploy.campaigns.repetition import RepeatedRun
 from swarmwire.deploy.runs import backends
 from swarmwire.deploy.runs.result import ArenaResult
 from swarmwire.metrics.measures.registry import METRICS
-from swarmwire.metrics.records.run_folder.verify import verify
 from tests.support.agent.hosts import PLAYERS
 from tests.support.world.locksteps import EncodedBackend
 
@@ -208,23 +206,8 @@ def test_worlds_with_arenas_that_leave_have_packets_and_faults_to_lose(tmp_path:
     assert happened == {"fail", "run_down", "revive"}
 
 
-def test_run_ends_when_its_last_arena_leaves(tmp_path: Path) -> None:
-    path = scenario(tmp_path, "unit-disk")
-    result = packed(path, (1, 2))
-    assert (result.ended, result.ticks, result.sim_time_s) == ("stopped", 17, 1.7)
-    assert [(arena.ended, arena.ticks) for arena in result.arenas] == [("stopped", 6), ("stopped", 17)]
-    assert packed(path, (2,)).arenas[0] == result.arenas[1]
-    told = result.summary()
-    assert [end["ticks"] for end in told["by_arena"]] == [6, 17]
-    assert told["by_arena"][1].items() >= {"ended": "stopped", "ticks": 17, "sim_time_s": 1.7}.items()
-    assert told["by_arena"][1]["counts"] == result.arenas[1].counts
-    at_the_end = packed(path, (1,), {1: TICKS})
-    assert (at_the_end.ended, at_the_end.ticks) == ("stopped", TICKS)
-
-
-@pytest.mark.parametrize("name", ["unit-disk", "signal"])
-def test_runners_do_not_mind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-    path = scenario(tmp_path, name)
+def test_arenas_leave_alike_through_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = scenario(tmp_path, "signal")
     here = packed(path, SEEDS[:3])
     monkeypatch.setattr(backends, "LocalBackend", EncodedBackend)
     there = packed(path, SEEDS[:3])
@@ -287,13 +270,3 @@ def test_record_of_an_arena_that_leaves_is_that_of_it_alone(tmp_path: Path) -> N
                 table = table.head(len(own))  # which are as many in all arenas
             assert table.equals(own), name
     assert RunFolder(tmp_path / "together").ticks().height == 11 + TICKS + 6
-
-
-def test_run_that_arenas_left_is_recorded_whole_and_repeated(tmp_path: Path) -> None:
-    result = packed(scenario(tmp_path, "unit-disk"), (5, 1), out=tmp_path / "together")
-    assert [found.part for found in verify(tmp_path / "together") if not found.good] == []
-    rerun = RepeatedRun(tmp_path / "together")
-    rerun.simulation.stop_conditions = Stops((5, 1), OVER)
-    repeated = rerun.run()
-    assert (repeated.same, repeated.compared) == (True, TICKS)
-    assert repeated.result.arenas == result.arenas

@@ -184,10 +184,6 @@ def test_without_the_standard_ones_a_run_has_those_that_are_listed(tmp_path, sce
     assert result.trajectory_sha256 == run(scenario).trajectory_sha256
 
 
-def test_custom_metric_changes_nothing_of_the_run(scenario):
-    assert run(scenario).trajectory_sha256 == run(scenario, overrides=["metrics=[]"]).trajectory_sha256
-
-
 def test_custom_metric_that_does_not_exist_is_refused_before_the_run(scenario):
     with pytest.raises(BadInput, match=r"s.toml: metrics\.0: .*'None'"):
         Simulation(scenario, overrides=['metrics=["spread.py:None"]'])

@@ -152,7 +152,7 @@ def test_paused_is_paused_and_steps_are_ticks(run):
         assert paused_at[0] > 25
 
 
-def test_loss_slid_to_1_takes_the_network_apart_and_slid_back_it_is_one_again(run):
+def test_page_disturbs_the_run_and_undoes_it_in_windows_of_any_width(run):
     _, address = run
     with chromium(address) as page:
         at_tick(page, 1)
@@ -169,33 +169,30 @@ def test_loss_slid_to_1_takes_the_network_apart_and_slid_back_it_is_one_again(ru
         page.click("#step")
         at_tick(page, 12)
         assert level(page, "components") == whole
-
-
-def test_robots_die_and_act_again_and_halves_part_and_heal(run):
-    _, address = run
-    with chromium(address) as page:
-        at_tick(page, 1)
         page.select_option("#robot", "flock-3")
         page.click("#kill")
         page.wait_for_selector("text=next tick")
         page.click("#step")
-        at_tick(page, 2)
+        at_tick(page, 13)
         assert level(page, "alive") == 19
         page.wait_for_selector("#events li:has-text('kill: flock-3')")
         page.click("#revive-all")
         page.click("#halve-x")
         page.click("#step")
-        at_tick(page, 3)
+        at_tick(page, 14)
         assert level(page, "alive") == 20
         parted = level(page, "components")
         assert parted > 1
         page.click("#heal")
         page.wait_for_selector("#heal:disabled")
         page.click("#step")
-        at_tick(page, 4)
+        at_tick(page, 15)
         assert level(page, "components") < parted
         assert page.is_disabled("#jam")
         assert "disk radio" in page.inner_text("#jam-why")
+        for width in (390, 800, 1400):
+            page.set_viewport_size({"width": width, "height": 900})
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 def test_page_stops_the_run_at_the_second_click_and_stays_until_closed(run):
@@ -270,12 +267,3 @@ def test_browser_requests_of_the_page_and_its_viewer_stay_on_this_machine(run):
     """Rerun's own page asks fonts.googleapis.com, api.github.com, app.rerun.io and tel.rerun.io."""
     _, address = run
     assert requested_hosts(address) == {"127.0.0.1"}
-
-
-def test_page_fits_a_narrow_window(run):
-    _, address = run
-    with chromium(address) as page:
-        at_tick(page, 1)
-        for width in (390, 800, 1400):
-            page.set_viewport_size({"width": width, "height": 900})
-            assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -14,7 +14,6 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.runs import phases
-from swarmwire.deploy.runs.gateways.serving import RunGateways
 from swarmwire.deploy.runs.real_time import warm_up
 from swarmwire.deploy.runs.record.inputs import LENGTH_BYTES, WITHIN
 from swarmwire.deploy.runs.scenario_parts import new_medium
@@ -79,19 +78,6 @@ def frames_of(folder: Path) -> list[dict[str, Any]]:
         found.append(msgpack.unpackb(data[LENGTH_BYTES:stop]))
         data = data[stop:]
     return found
-
-
-def test_real_time_run_ends_and_its_fates_add_up():
-    result = run(LOSSY, overrides=["duration_s=4"], runners=4, realtime=5)
-    assert (result.mode, result.ended, result.ticks) == ("realtime", "duration", 40)
-    assert result.wall_time_s >= 4 / 5
-    assert result.radio is not None
-    assert sum(result.radio.fates.values()) == result.radio.intended
-    assert result.radio.fates["received"] > 0
-    assert result.realtime is not None
-    assert (result.realtime.factor, result.realtime.subtick_s) == (5, None)
-    summary = result.summary()["realtime"]
-    assert {"factor", "late_answers", "missed_ticks", "worst_lag_s", "frames_dropped", "watchdog_stops"} <= set(summary)
 
 
 @pytest.mark.parametrize("runners", [None, 2])
@@ -176,17 +162,6 @@ def test_rehearsal_receives_packets_within_ticks_if_the_run_has_subticks(subtick
     assert (sum(within) > 0) == subticks
 
 
-def test_rehearsal_of_a_gateway_run_comes_before_any_gateway_answers(monkeypatch) -> None:
-    said = list[str]()
-    monkeypatch.setattr(phases, "warm_up", lambda world, *_, **__: said.append(f"rehearsed {world.static.robots}"))
-    simulation = Simulation(FLOCKING, gateways="epuck2", realtime=100.0)
-    serve = RunGateways.serve
-    monkeypatch.setattr(RunGateways, "serve", lambda *given, **by: (said.append("served"), serve(*given, **by))[1])
-    with simulation:
-        assert simulation.world is not None
-    assert said == ["rehearsed 8", "served"]
-
-
 def test_rehearsal_comes_before_every_real_time_run_and_changes_nothing(monkeypatch) -> None:
     rehearsed = list[int]()
     monkeypatch.setattr(phases, "warm_up", lambda *given, **by: (rehearsed.append(1), warm_up(*given, **by)))
@@ -197,10 +172,3 @@ def test_rehearsal_comes_before_every_real_time_run_and_changes_nothing(monkeypa
         results.append(simulation.result.trajectory_sha256)
     assert rehearsed == [1]
     assert results[0] == results[1]
-
-
-def test_runs_that_keep_to_no_clock_are_not_rehearsed(monkeypatch) -> None:
-    monkeypatch.setattr(phases, "warm_up", None)
-    with Simulation(FLOCKING) as simulation:
-        simulation.run(1)
-    assert simulation.result.ticks == 1

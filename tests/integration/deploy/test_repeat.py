@@ -8,6 +8,8 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from shutil import copytree
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +17,8 @@ from typer.testing import CliRunner, Result
 
 from swarmwire.comms.base.errors import AgentFailed, BadInput
 from swarmwire.comms.observe.truth import Truth
-from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.robot.tick_io import Actions, Readings
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
+from swarmwire.comms.robot.tick_io import Actions
 from swarmwire.deploy import Recording, Simulation, repeat, run
 from swarmwire.deploy.campaigns.repetition import RepeatedRun
 from swarmwire.deploy.cli.app import app
@@ -102,14 +104,6 @@ def test_repeat_gives_the_same_run_also_through_frames(tmp_path, monkeypatch, en
     assert not (tmp_path / "run" / "inputs").exists()
 
 
-def test_several_seeds_are_repeated_side_by_side(tmp_path):
-    result = run(LOSSY, overrides=SHORT, seeds=[3, 5], out=tmp_path / "run")
-    repetition = repeat(tmp_path / "run")
-    assert repetition.before == tuple(result.trajectory_sha256)
-    assert repetition.same
-    assert [arena.seed for arena in repetition.result.arenas] == [3, 5]
-
-
 def test_scenario_in_the_run_folder_is_as_run_without_omitted_keys(tmp_path):
     run(LOSSY, overrides=[*SHORT, "radio.loss=0.45"], seed=9, out=tmp_path / "run")
     text = (tmp_path / "run" / "scenario.toml").read_text()
@@ -160,10 +154,9 @@ def test_agent_files_are_copied_and_the_originals_are_not_needed(tmp_path, mine)
 def test_agent_file_that_was_edited_is_named_and_the_run_differs(tmp_path, mine):
     run(mine, out=tmp_path / "run")
     path = tmp_path / "run" / "files" / "mine.py"
-    path.write_text(path.read_text().replace("0.5)", "0.6)"))  # of the same size, maybe within the same second
+    path.write_text(FILE_AGENT.replace("0.5)", "0.5 if robots.time_s < 0.95 else 0.6)"))
     repetition = repeat(tmp_path / "run")
-    assert repetition.same is False
-    assert repetition.first_difference == 0
+    assert (repetition.same, repetition.first_difference) == (False, 10)
     assert [change.split()[0] for change in repetition.changes] == ["files/mine.py"]
     path.unlink()
     with pytest.raises(BadInput, match="mine.py"):
@@ -223,7 +216,7 @@ def test_repeat_command_prints_same_or_different_and_names_changes(tmp_path, min
     assert (tmp_path / "again" / "summary.json").exists()
     assert called(folder, "--quiet").stdout == ""
     path = folder / "files" / "mine.py"
-    path.write_text(path.read_text().replace("0.5)", "0.6)"))
+    path.write_text(path.read_text().replace("0.5)", "0.6)"))  # of the same size, maybe within the same second
     other = called(folder)
     assert other.exit_code == 1
     assert "different run from tick 0" in other.stdout
@@ -287,40 +280,11 @@ def test_run_that_an_agent_ended_is_repeated_to_its_end(tmp_path, mine):
     assert re.search("same run.* 5 ticks.* failed", called(tmp_path / "run").stdout)
 
 
-def test_first_tick_that_differs_is_named(tmp_path, mine):
-    run(mine, out=tmp_path / "run")
-    path = tmp_path / "run" / "files" / "mine.py"
-    path.write_text(FILE_AGENT.replace("0.5)", "0.5 if robots.time_s < 0.95 else 0.6)"))
-    repetition = repeat(tmp_path / "run")
-    assert (repetition.same, repetition.first_difference) == (False, 10)
-
-
-def test_interrupted_run_is_repeated_as_far_as_it_came(tmp_path):
-    watcher = Watcher((lambda truth: truth.tick == 12, interrupt))
-    result = run(LOSSY, overrides=["duration_s=500"], out=tmp_path / "run", observers=[watcher])
-    assert (result.ended, result.ticks) == ("interrupted", 13)
-    repetition = repeat(tmp_path / "run")
-    assert repetition.same
-    assert repetition.result.ticks == 13
-
-
-class Standing:
-    """A backend whose robot stands."""
-
-    def start(self) -> None: ...
-
-    def act(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> Actions:
-        return Actions(np.zeros(1, np.int64), np.ones(1, np.bool_), *np.zeros((3, 1)))
-
-    def counts(self) -> dict[str, int]:
-        return {}
-
-    def close(self) -> None: ...
-
-
 def test_record_that_cannot_be_written_does_not_end_the_run_and_is_counted(tmp_path):
     (tmp_path / "inputs").write_text("in the way")
-    backend = RecordedBackend(Standing(), tmp_path, lambda tick: tick >= 2)
+    still = Actions(np.zeros(1, np.int64), np.ones(1, np.bool_), *np.zeros((3, 1)))
+    standing: Any = SimpleNamespace(act=lambda *_: still, start=None, counts=dict, close=None)
+    backend = RecordedBackend(standing, tmp_path, lambda tick: tick >= 2)
     for tick in range(5):
         backend.act(tick, {}, ReceivedPackets.none(), NO_TX_STATUSES)
     record = backend.record()

@@ -14,23 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.agent.joining import JoinSettings, join
-from swarmwire.agent.runner import Arrivals, ProcessPool
-from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.deploy import RunFolder, repeat, run
-from tests.support.agent.processes import thread_server
 from tests.support.deploy.pseudo_terminal import terminal
 from tests.support.deploy.runs import LOSSY, called, swarmwire
 
 LONG = ["--set", "duration_s=3600"]
-FAULTY = """
-from swarmwire.agent import Agent, Robot
-
-class Faulty(Agent):
-    def step(self, robot: Robot) -> None:
-        if robot.time_s > 0.35:
-            raise ZeroDivisionError("too much")
-"""
 SHORT = ("--set", "duration_s=2")
 
 
@@ -78,16 +66,6 @@ def test_ctrl_c_ends_a_run_in_real_time_over_runners_and_gives_the_terminal_back
         assert not user.changed()
     realtime = json.loads((tmp_path / "run" / "summary.json").read_text())["realtime"]
     assert realtime["factor"] == 20.0
-
-
-def test_run_that_fails_gives_the_terminal_back(tmp_path):
-    (tmp_path / "faulty.py").write_text(FAULTY)
-    agent = ["--set", f"robots.flock.agent={tmp_path / 'faulty.py'}:Faulty", "--set", "robots.flock.params={}"]
-    with terminal("run", LOSSY, *agent, "--out", tmp_path / "run") as user:
-        text = user.rest()
-        assert user.process.returncode == 1
-        assert not user.changed()
-    assert "too much" in text[text.rindex("─╯") :]
 
 
 def test_without_a_terminal_there_are_plain_lines(tmp_path):
@@ -234,17 +212,6 @@ def test_with_certificates_a_runner_is_who_its_own_says(tmp_path, certs):
     assert "r1 joined with flock-0 … flock-19 (20 robots) before the first tick" in errors
 
 
-def test_certificates_of_a_foreign_ca_need_member_names_without_a_register(tmp_path, certs):
-    (certs / "certs.json").unlink()
-    mine = ("--certs", certs, "--name", "world", "--runner", "r1")
-    with world(tmp_path / "run", "--listen", "tls/127.0.0.1:0", *mine) as process:
-        endpoint, _ = listens_at(process)
-        other = swarmwire("join", endpoint, "--certs", certs, "--name", "r2")
-        assert (other.returncode, "let r2 in" in other.stderr) == (1, True)
-        played = swarmwire("join", endpoint, "--certs", certs, "--name", "r1")
-        assert (played.returncode, played.stderr.splitlines()[-1]) == (0, "the run is over")
-
-
 def test_world_at_a_terminal_shows_who_is_missing_until_ctrl_c(tmp_path):
     arguments = ("world", LOSSY, "--listen", "tcp/127.0.0.1:0", "--out", tmp_path / "run")
     with terminal(*arguments) as window:
@@ -254,24 +221,3 @@ def test_world_at_a_terminal_shows_who_is_missing_until_ctrl_c(tmp_path):
         text = window.rest()
     assert window.process.returncode == 130
     assert "interrupted" in text
-
-
-@pytest.mark.parametrize(
-    ("arguments", "why"),
-    [
-        (("nonsense",), "nonsense"),
-        (("tcp/127.0.0.1:1", "--robots", "0"), "got 0"),
-        (("tcp/127.0.0.1:1", "--robots", "1", "--names", "flock-0"), "--robots and --names"),
-        (("tcp/127.0.0.1:1", "--name", "a/*"), "a/*"),
-        (("tcp/127.0.0.1:1", "--scenario", "no.toml"), "no.toml"),
-    ],
-)
-def test_join_options_that_are_invalid_are_refused(monkeypatch, capsys, arguments, why):
-    code, _, errors = called(monkeypatch, capsys, "join", *arguments)
-    assert code == 2
-    assert why in errors
-
-
-def test_join_where_nobody_listens_says_so():
-    with pytest.raises(RunnerLost, match="no world answers at tcp/127.0.0.1:1$"):
-        join(JoinSettings("tcp/127.0.0.1:1", name="a", connect_s=0.2), Arrivals(), ProcessPool(thread_server()))

@@ -11,17 +11,12 @@ from pathlib import Path
 import pytest
 
 from examples.protocol.runner import frame
-from swarmwire.agent.joining import JoinSettings, join
-from swarmwire.agent.runner import Arrivals, ProcessPool
-from swarmwire.comms.base.errors import AgentFailed, BadInput, Interrupted, RunnerLost
-from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.sessions import closed_after, listens_at, open_world
+from swarmwire.comms.base.errors import AgentFailed, Interrupted
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.runs.config import Listening, Recording
 from swarmwire.deploy.runs.live_address import Announcement, live_runs, read_live
 from swarmwire.deploy.runs.result import Result
 from swarmwire.deploy.runs.simulation import Simulation, run_to_end
-from tests.support.agent.processes import thread_server
 from tests.support.clocks import until
 from tests.support.deploy.joiners import HERE, Joiners
 from tests.support.deploy.runs import LOSSY
@@ -210,14 +205,3 @@ def test_run_names_the_frozen_or_lost_runner_that_it_waits_for(tmp_path, joiners
         joiners.send("a", signal.SIGKILL)
         until(control.status, lambda status: status["runners"]["lost"] == 1)
         assert waits(control) == "the runner that plays flock-0 … flock-19 (20 robots)"
-
-
-def test_unknown_run_is_refused_with_the_runs_at_the_endpoint():
-    with closed_after(open_world("tcp/127.0.0.1:0", 10.0)) as world:
-        endpoint = listens_at(world)[0]
-        token = world.liveliness().declare_token(Keys("3f2a").world)
-        with pytest.raises(BadInput, match=r"--run: expected one of the runs at .*: 3f2a, got 1234"):
-            join(JoinSettings(endpoint, run="1234", name="a"), Arrivals(), ProcessPool(thread_server()))
-        with pytest.raises(RunnerLost, match="sent no session information"):  # this one is asked
-            join(JoinSettings(endpoint, run="3f2a", name="a"), Arrivals(), ProcessPool(thread_server()))
-        token.undeclare()

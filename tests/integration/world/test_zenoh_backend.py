@@ -15,6 +15,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+import zenoh
 
 from swarmwire.agent import runner
 from swarmwire.comms.base.clock import WallClock, to_ns
@@ -24,7 +25,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.limits import JoinLimits
+from swarmwire.comms.wire.limits import MAX_BYTES, JoinLimits
 from swarmwire.comms.wire.sessions import closed_after, open_runner, unix_endpoint
 from swarmwire.world.backends import zenoh_backend
 from swarmwire.world.backends.join_policy import JoinPolicy
@@ -121,6 +122,7 @@ def test_foreign_frames_are_counted_and_the_run_continues(endpoint: str) -> None
         with open_runner(endpoint) as foreign:
             for key in (keys.answer("r0"), keys.answer("stranger"), keys.alive("stranger")):
                 foreign.put(key, b"\xc1 no frame")
+            foreign.put(keys.answer("r0"), bytes(MAX_BYTES + 1), congestion_control=zenoh.CongestionControl.BLOCK)
             foreign.put(keys.answer("r0"), frames.encode("actions", 10**9, {}))
             foreign.put(keys.answer("r0"), frames.encode("ready", 0, {}))
             foreign.delete(keys.answer("r0"))
@@ -132,7 +134,8 @@ def test_foreign_frames_are_counted_and_the_run_continues(endpoint: str) -> None
                     (keys.join("x"), JoinRequest().encode()),
                 )
             ]
-            names = {"malformed_frames", "unknown_runner_frames", "wrong_tick_frames", "unexpected_kind_frames"}
+            names = {"malformed_frames", "oversized_frames", "unknown_runner_frames"}
+            names |= {"wrong_tick_frames", "unexpected_kind_frames"}
             tick = 0
             while not names | {"bad_join", "refused_join"} <= set(backend.counts()) or backend.counts()["bad_join"] < 2:
                 got = act(backend, tick, ROWS)

@@ -1,6 +1,5 @@
 """Agents for tests, each for one service of a host."""
 
-import os
 from typing import ClassVar
 
 import numpy as np
@@ -150,16 +149,6 @@ class Failing(Agent):
     def step(self, robot: Robot) -> None:
         if robot.time_s > 0.15 and robot.compass.heading_rad > 0.0:
             print(robot.proximity)
-
-
-class Vanishing(Agent):
-    """Takes its whole process away at once, in tick 2 as the robot whose compass shows more than 0."""
-
-    needs = ("compass",)
-
-    def step(self, robot: Robot) -> None:
-        if robot.time_s > 0.15 and robot.compass.heading_rad > 0.0:
-            os._exit(3)
 
 
 class Unmade(Agent):

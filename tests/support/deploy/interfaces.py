@@ -55,6 +55,11 @@ place = {{ how = "poses", poses = [{poses}] }}
 """
 
 
+def with_program(scenario: str, *command: str) -> str:
+    """The scenario, with robots that run this program."""
+    return scenario.replace("[robots.line]\n", f"[robots.line]\nprogram = {json.dumps(command)}\n")
+
+
 STILL = """
 from swarmwire.agent import Agent, Robot
 
@@ -96,6 +101,11 @@ class InterfacesRun:
     def address(self, robot: str) -> str:
         """Its IPv4 address."""
         return self.robots[robot]["ipv4"].partition("/")[0]
+
+    def output(self, robot: str) -> str:
+        """The output of a robot's program so far."""
+        path = self.folder / "programs" / f"{robot}.log"
+        return path.read_text() if path.exists() else ""
 
     def end(self) -> dict[str, Any]:
         """End the run as Ctrl-C does; its summary."""

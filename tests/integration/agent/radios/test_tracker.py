@@ -14,11 +14,11 @@ from swarmwire.agent.drivers.driver import DriverLost
 from swarmwire.agent.radios.control import ControlPoint
 from swarmwire.agent.radios.tracker import MAX_AGE_NS, Tracker
 from swarmwire.agent.radios.zenoh_radio import range_bearing
-from swarmwire.comms.base.clock import NS_PER_S, WallClock
+from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.wire.radio_bridge import Pose
 from swarmwire.comms.wire.robot_network import ESTOP, STATUS, STOPPED, ask_all
 from tests.support.clocks import FakeClock, until
-from tests.support.swarms import KEYS, ROBOTS, KeptLog, meet, peers, radio, received_by, words
+from tests.support.swarms import KEYS, ROBOTS, KeptLog, meet, peers, radio, words
 
 NOW_NS = 1_767_225_600 * NS_PER_S
 metres = st.floats(-50, 50)
@@ -170,15 +170,6 @@ def test_packet_without_a_fresh_pose_is_dropped_for_agents_that_need_it():
         received, _ = asks_not.received(0)
         assert np.isnan(received.measured["range_m"]).tolist() == [True]
         assert np.isnan(received.measured["bearing_rad"]).tolist() == [True]
-
-
-def test_radio_without_a_tracker_has_no_measures():
-    with peers(2) as (session, other):
-        a, b = radio(session, "flock-0", WallClock()), radio(other, "flock-1")
-        meet(other, [a])
-        b.send(words(1.0))
-        assert received_by(a, 1) == [(1, 0, 1.0)]
-        assert (a.measures, a.needs) == ((), frozenset())
 
 
 class Robot:

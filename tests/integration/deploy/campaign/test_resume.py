@@ -19,7 +19,6 @@ from swarmwire.deploy.campaigns.store import StorageFailed
 from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
-from tests.support.deploy.runs import called
 from tests.support.metrics.recorded import damaged
 
 VARY = {"radio.loss": [0.0, 0.5]}
@@ -160,17 +159,6 @@ def test_full_disk_loses_no_finished_runs_of_a_sweep(tmp_path, scenario, here, m
     assert here[0].closed
     assert resume(folder).is_over
     assert len(rows_in(folder)) == 4
-
-
-def test_full_disk_in_a_sweep_is_one_line_at_the_command_line(tmp_path, scenario, here, monkeypatch, capsys):
-    with monkeypatch.context() as patched:
-        dying_at(patched, 2, FULL)
-        code, _, errors = called(
-            patched, capsys, "sweep", scenario, "--seeds", "2", "--batch", "1", "--out", tmp_path / "c"
-        )
-    assert code == 1
-    assert errors.startswith(f"error: {tmp_path / 'c'}: ")
-    assert errors.count("\n") == 1
 
 
 def test_series_that_cannot_be_joined_are_no_loss_either(tmp_path, scenario, here, monkeypatch):

@@ -64,13 +64,6 @@ def test_row_of_a_sweep_has_what_a_run_of_its_own_has(reference):
     assert row["target_best.final"] is None
 
 
-def test_rows_and_series_do_not_depend_on_packs(reference, tmp_path, here):
-    sweep(reference / "two.toml", seeds=3, vary=VARY, out=tmp_path / "c", batch=2)
-    assert rows_in(tmp_path / "c") == rows_in(reference / "c")
-    assert series_in(tmp_path / "c").equals(series_in(reference / "c"), null_equal=True)
-    assert here[0].closed
-
-
 def test_columns_have_one_order(reference):
     columns = pl.read_parquet(reference / "c" / "summary.parquet").columns
     assert columns[:7] == ["run", "point", "seed", "radio.loss", "robots.pair.count", "ended", "error"]
@@ -281,12 +274,10 @@ def test_campaign_file_means_the_same_as_options_which_override_it(tmp_path, sce
     ("line", "told"),
     [
         ("secnario = 'two.toml'", "secnario: "),
-        ("scenario = 3", "scenario: "),
         ("format = 2", "format: "),
         ("seeds = 0", "seeds: "),
         ("design = 'gird'", "--design: "),
         ("vary = { 'radio.loss' = 3 }", r"vary\.radio\.loss: "),
-        ("vary = { 'radio.loss' = [] }", r"vary\.radio\.loss: "),
         ("vary = { 'radio.lss' = [1] }", r"vary\.radio\.lss: radio\.lss: "),
         ("overrides = [3]", r"overrides\[0\]: "),
     ],
@@ -307,10 +298,8 @@ def test_campaign_file_that_is_invalid_is_refused_in_a_line(tmp_path, scenario, 
     [
         ([], "SCENARIO: is missing"),
         (["two.toml"], "--seeds: is missing"),
-        (["two.toml", "--seeds", "0"], "--seeds: expected "),
         (["two.toml", "--seeds", "2", "--vary", "radio.losss=0,1"], "--vary radio.losss=0,1: radio.losss: "),
         (["two.toml", "--seeds", "2", "--design", "list"], "--design: .*empty"),
-        (["no.toml", "--seeds", "2"], "no.toml: "),
         (["--resume", "nowhere"], "nowhere: "),
         (["--resume", "nowhere", "--seeds", "3"], "SCENARIO: "),
         (["two.toml", "--seeds", "2", "--record-seeds", "9"], "--record-seeds: "),

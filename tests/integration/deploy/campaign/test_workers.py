@@ -10,24 +10,15 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaigns import local
-from swarmwire.deploy.campaigns import sweep as sweeping
 from swarmwire.deploy.campaigns.local import LocalExecutor, Silence
 from swarmwire.deploy.campaigns.schedule import execute
 from swarmwire.deploy.campaigns.worker import Task
 from tests.support.clocks import FakeClock, until
-from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
+from tests.support.deploy.campaign import rows_in, scenario_in, series_in
 from tests.support.deploy.runs import ROOT
 
 VARY = {"radio.loss": [0.0, 0.5]}
 DEADLY = 2  # one of the seeds that stumble
-
-
-def test_workers_give_the_rows_and_series_of_this_process(tmp_path, stumbling, monkeypatch):
-    asked = {"seeds": 4, "vary": VARY, "batch": 1}
-    assert sweep(stumbling, out=tmp_path / "there", workers=2, **asked).is_over
-    monkeypatch.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
-    assert sweep(stumbling, out=tmp_path / "here", **asked).failed
-    same(tmp_path / "there", tmp_path / "here")
 
 
 def same(folder, whole):

@@ -109,15 +109,6 @@ def test_estop_stops_all_others_despite_a_robot_that_hangs(fleet, on_wire, monke
     assert out[1].startswith("flock-0  stopped, confirmed over the network")
 
 
-def test_estop_continues_over_the_network_after_an_ssh_failure(robots, on_wire, monkeypatch):
-    def fails(*_):
-        raise ValueError("a mistake")
-
-    monkeypatch.setattr(estop_module, "_stop_host", fails)
-    code, (line,) = robots("estop")
-    assert (code, line) == (0, f"{BY_NETWORK} (by SSH: a mistake)")
-
-
 @pytest.mark.parametrize("options", [(), ("--robots", "flock-0", "--group", "red")])
 def test_estop_loads_only_network_modules_before_the_request(fleet, options):
     fleet.add("flock-0", groups=["red"])

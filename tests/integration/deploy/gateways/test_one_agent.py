@@ -2,19 +2,12 @@
 
 import pytest
 
-from benchmarks.one_agent import CASES, emulated, is_same_per_process, through_gateway
+from benchmarks.one_agent import CASES, emulated, through_gateway
 from tests.support.deploy.gateways import outside
 
 DURATION_S = 20.0
 SEED = 2  # of the run through a gateway
 MAX_MISSED = 0.1  # of the ticks: a machine that did not keep up tells nothing of the robots
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name == "e-puck2" else pytest.mark.slow) for name in CASES]
-)
-def test_process_per_robot_moves_robots_the_same_bit_for_bit(name: str) -> None:
-    assert is_same_per_process(CASES[name], DURATION_S)
 
 
 @pytest.mark.slow

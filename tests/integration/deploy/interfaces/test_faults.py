@@ -5,7 +5,15 @@ import sys
 
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.clocks import until
-from tests.support.deploy.interfaces import DISK, InterfacesRun, line, needs_interfaces, needs_program, running
+from tests.support.deploy.interfaces import (
+    DISK,
+    InterfacesRun,
+    line,
+    needs_interfaces,
+    needs_program,
+    running,
+    with_program,
+)
 from tests.support.deploy.runs import swarmwire
 
 pytestmark = [needs_interfaces, needs_program("ip", "ping", "unshare")]
@@ -87,8 +95,7 @@ def test_beacons_reach_groups_without_an_interface_also_after_changes(tmp_path):
     )
     (tmp_path / "beacon.py").write_text(BEACON)
     receivers = "".join(f"{sys.executable} beacon.py {group} {len(changes)} & " for group in GROUPS)
-    receive = json.dumps(["sh", "-c", f"{receivers} wait"])
-    scenario = line(2, CLOSE).replace("[robots.line]\n", f"[robots.line]\nprogram = {receive}\n") + DISK
+    scenario = with_program(line(2, CLOSE), "sh", "-c", f"{receivers} wait") + DISK
     with running(tmp_path, scenario) as world:
         log = world.folder / "programs" / "line-1.log"
         until(lambda: log.exists() and log.read_text().count("ready") == len(GROUPS))

@@ -1,6 +1,5 @@
 """Gateways within robots' namespaces: programs on a robot drive it, and nothing else."""
 
-import json
 import re
 import sys
 from pathlib import Path
@@ -12,7 +11,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.clocks import until
-from tests.support.deploy.interfaces import DISK, STILL, InterfacesRun, line, needs_interfaces, running
+from tests.support.deploy.interfaces import DISK, STILL, line, needs_interfaces, running, with_program
 
 pytestmark = needs_interfaces
 
@@ -64,9 +63,7 @@ node.close()
 
 def driven(robots: int, *program: str, seconds: int = 3600) -> str:
     """A scenario of robots in a line that run a program."""
-    group = "[robots.line]\n"
-    told = line(robots).replace(group, f"{group}program = {json.dumps(program)}\n").replace("3600", str(seconds))
-    return told + DISK
+    return with_program(line(robots), *program).replace("3600", str(seconds)) + DISK
 
 
 def turned_rad(folder: Path) -> np.ndarray:
@@ -74,18 +71,12 @@ def turned_rad(folder: Path) -> np.ndarray:
     return abs(np.array(RunFolder(folder).ticks()["heading_rad"].to_list())).max(axis=0)
 
 
-def output(world: InterfacesRun, robot: str) -> str:
-    """The output of a robot's program so far."""
-    path = world.folder / "programs" / f"{robot}.log"
-    return path.read_text() if path.exists() else ""
-
-
 def test_program_drives_its_robot_through_the_gateway_in_its_namespace(tmp_path):
     scenario = driven(2, sys.executable, "driver.py", seconds=3)
     with running(tmp_path, scenario, "--gateway", "epuck2", files={"driver.py": EPUCK2_DRIVER}) as world:
         assert world.process.wait(60) == 0
-    assert (turned_rad(world.folder) > 0.5).all(), output(world, "line-0")
-    assert output(world, "line-1").startswith("105\n")
+    assert (turned_rad(world.folder) > 0.5).all(), world.output("line-0")
+    assert world.output("line-1").startswith("105\n")
 
 
 def test_ros_nodes_find_the_router_of_their_robot_and_no_node_of_another(tmp_path):
@@ -94,7 +85,7 @@ def test_ros_nodes_find_the_router_of_their_robot_and_no_node_of_another(tmp_pat
     scenario = driven(2, sys.executable, "node.py")
     with running(tmp_path, scenario, "--gateway", "ros2", files=files) as world:
         for robot in world.robots:
-            until(lambda robot=robot: output(world, robot) == "at tcp/127.0.0.1:7447\n")
+            until(lambda robot=robot: world.output(robot) == "at tcp/127.0.0.1:7447\n")
         look = [sys.executable, str(tmp_path / "look.py")]
         for own, other in (("line_0", "line_1"), ("line_1", "line_0")):
             robot = own.replace("_", "-")
@@ -103,7 +94,7 @@ def test_ros_nodes_find_the_router_of_their_robot_and_no_node_of_another(tmp_pat
             assert f"%{own}" in seen
             assert other not in seen
         world.end()
-    assert (turned_rad(world.folder) > 0.5).all(), output(world, "line-0")
+    assert (turned_rad(world.folder) > 0.5).all(), world.output("line-0")
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ import json
 import os
 import re
 import signal
-from pathlib import Path
 
 import psutil
 import pytest
@@ -12,20 +11,10 @@ import pytest
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import repeat, run
 from tests.support.clocks import until
-from tests.support.deploy.interfaces import DISK, STILL, line, needs_interfaces, needs_program, running
+from tests.support.deploy.interfaces import DISK, STILL, line, needs_interfaces, needs_program, running, with_program
 from tests.support.deploy.runs import swarmwire
 
 pytestmark = needs_interfaces
-GROUP = "[robots.line]\n"
-
-
-def with_program(scenario: str, *command: str) -> str:
-    return scenario.replace(GROUP, f"{GROUP}program = {json.dumps(command)}\n")
-
-
-def output(folder: Path, robot: str) -> str:
-    path = folder / "programs" / f"{robot}.log"
-    return path.read_text() if path.exists() else ""
 
 
 def test_program_knows_its_robot_and_its_output_and_end_are_kept(tmp_path):
@@ -33,7 +22,7 @@ def test_program_knows_its_robot_and_its_output_and_end_are_kept(tmp_path):
     scenario = with_program(line(2), "sh", "-c", script).replace("3600", "2") + DISK
     with running(tmp_path, scenario, "--packets", "all") as world:
         assert world.process.wait(60) == 0
-    lines = output(world.folder, "line-1").splitlines()
+    lines = world.output("line-1").splitlines()
     assert sorted(lines[:-3]) == [
         "ROBOT=line-1",
         "ROBOT_INDEX=1",
@@ -70,8 +59,8 @@ def test_program_dies_with_its_robot_and_starts_when_it_is_revived(tmp_path):
     script = "trap '' TERM; echo started; sleep 1000 & wait"
     kill = '\n[[events]]\ndo = "kill"\nrobots = { names = ["line-0"] }\nat_s = 0.5\nfor_s = 0.5\n'
     with running(tmp_path, with_program(line(2), "sh", "-c", script) + DISK + kill) as world:
-        until(lambda: output(world.folder, "line-0").count("started") == 2)
-        assert output(world.folder, "line-1").count("started") == 1
+        until(lambda: world.output("line-0").count("started") == 2)
+        assert world.output("line-1").count("started") == 1
         sleepers = until(lambda: sleepers_of(world.process.pid), lambda found: len(found) == 2)
         os.kill(world.process.pid, signal.SIGKILL)
         until(lambda: not any(process.is_running() for process in sleepers))

@@ -15,8 +15,6 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.join import JoinRequest
 from swarmwire.comms.wire.keys import Keys
 from swarmwire.comms.wire.limits import LIMITS, MAX_BYTES
-from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.sessions import open_runner
 from swarmwire.deploy import run
 from swarmwire.deploy.robots.certificates.folder import begin_authority, issue, revoke
 from swarmwire.deploy.robots.certificates.register import certificate_request
@@ -190,18 +188,13 @@ class Hostile:
             session.put(keys.answer(self.name), bytes(size), congestion_control=BLOCK, attachment=OWN)
 
 
-@pytest.mark.parametrize("name", ["mallory", "robot-1", "gone"])
-def test_another_members_certificate_gets_nowhere(certs, undisturbed, tmp_path, name):
-    """An admitted runner without robots, a member of another network, and one that is revoked."""
+def test_admitted_runner_without_robots_gets_nowhere(certs, undisturbed, tmp_path):
     with ExitStack() as opened:
-        hostile = Hostile(name, opened)
+        hostile = Hostile("mallory", opened)
         result = GuardedWorld(certs, hostile).run(tmp_path / "run")
         assert list(result.trajectory_sha256) == undisturbed
         assert hostile.received == []
     arrived = faults(result.counts)
-    if name != "mallory":
-        assert arrived == {}
-        return
     assert arrived.keys() == {"unknown_runner_frames", "flooded_frames"}
     assert sum(arrived.values()) == FLOOD + 1  # the one that no link takes is not seen here
 
@@ -212,16 +205,6 @@ def flood(world: GuardedWorld, name: str, opened: ExitStack) -> None:
     wait_for_listeners(session, own)
     for _ in range(4 * LIMITS.flood):
         session.put(own, b"x", congestion_control=BLOCK)
-
-
-def test_runner_that_floods_without_robots_is_ignored_and_others_are_not(certs, undisturbed, tmp_path):
-    with ExitStack() as opened:
-        result = GuardedWorld(certs, lambda world: flood(world, "mallory", opened)).run(tmp_path / "run")
-    assert list(result.trajectory_sha256) == undisturbed
-    counts = faults(result.counts)
-    assert counts.pop("flooded_frames") > LIMITS.flood
-    # Those that were let through before, and answers of the others that were received twice meanwhile.
-    assert counts.keys() <= {"unknown_runner_frames", "wrong_tick_frames"}
 
 
 def test_runner_that_plays_and_floods_is_lost(certs, tmp_path):
@@ -251,19 +234,3 @@ def test_runner_that_plays_can_neither_join_twice_nor_answer_for_others(certs, u
     # An answer about too many robots is of the wrong tick once the runner's own has come.
     assert counts.pop("malformed_frames") + counts.pop("wrong_tick_frames") == 3
     assert counts == {"refused_join": 1, "unexpected_kind_frames": 1}
-
-
-def test_certificate_of_another_ca_makes_no_link(certs, undisturbed, tmp_path):
-    others = authority(tmp_path / "other")
-    foreign = Network(ca=certs / "ca.pem", certificate=others / "r0.pem", key=others / "r0.key")
-
-    def disturb(world: GuardedWorld) -> None:
-        for endpoint in (world.endpoint, world.observed):
-            with pytest.raises(zenoh.ZError):
-                open_runner(endpoint, 0.3, foreign)
-            with pytest.raises(zenoh.ZError):
-                open_runner(endpoint.replace("tls/", "tcp/"), 0.3)
-
-    result = GuardedWorld(certs, disturb).run(tmp_path / "run")
-    assert list(result.trajectory_sha256) == undisturbed
-    assert not faults(result.counts)

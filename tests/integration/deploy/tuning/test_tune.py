@@ -16,7 +16,6 @@ import pytest
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
 from swarmwire.deploy.campaigns.tuning.best import gained
-from swarmwire.deploy.campaigns.tuning.run import NothingFound
 from swarmwire.deploy.campaigns.tuning.study import FILE
 from swarmwire.deploy.cli.actions import tune
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
@@ -167,14 +166,6 @@ def test_trials_that_fail_are_told_of_and_never_the_best(tmp_path, scenario):
 
 
 @pytest.mark.usefixtures("here")
-def test_tuning_in_which_all_trials_fail_raises_one_line(tmp_path, scenario):
-    with pytest.raises(NothingFound, match="all 3 trials failed.*too fast") as ended:
-        tuned(scenario, tmp_path / "t", "robots.pair.params.speed=0.6:1", trials=3)
-    assert "\n" not in str(ended.value)
-    assert not (tmp_path / "t" / "best.toml").exists()
-
-
-@pytest.mark.usefixtures("here")
 def test_values_that_are_invalid_together_fail_their_trial(tmp_path, scenario):
     searched = ("robots.pair.count=2,60", "arena.size_m=[4.0, 4.0],[0.3, 0.3]")
     found = tuned(scenario, tmp_path / "t", *searched, trials=6, seeds=1)
@@ -240,18 +231,13 @@ def test_tune_command_prints_what_it_found_its_worth_and_what_to_do_next(tmp_pat
     [
         ([], "SCENARIO: is missing"),
         (["bowl.toml", "--search", AT], "--goal: is missing"),
-        (["bowl.toml", *GOAL], "--search: is missing"),
-        (["no.toml", *GOAL, "--search", AT], "no.toml: "),
         (["bowl.toml", *GOAL, "--search", "robots.pair.cuont=1:2"], "--search robots.pair.cuont=1:2: .*cuont: "),
         (["bowl.toml", *GOAL, "--search", "metrics.0.at=0:2"], "--search metrics.0.at=0:2: .*at most 1"),
-        (["bowl.toml", *GOAL, "--search", "metrics.0.at=-1:1"], "--search metrics.0.at=-1:1: .*at least 0"),
         (["bowl.toml", *GOAL, "--search", "robots.pair.body=epuck,epock"], "--search robots.pair.body=.*epuck"),
         (["bowl.toml", *GOAL, "--search", "seed=1:5"], "--search seed=1:5: "),
         (["bowl.toml", *GOAL, "--search", AT, "--search", AT], f"--search {AT}: .*once"),
         (["bowl.toml", "--goal", "min bawl", "--search", AT], "--goal: bawl: .*bowl"),
         (["bowl.toml", *GOAL, "--search", AT, "--trials", "0"], "--trials: expected 1 to"),
-        (["bowl.toml", *GOAL, "--search", AT, "--parallel-trials", "0"], "--parallel-trials: expected 1 to"),
-        (["bowl.toml", *GOAL, "--search", AT, "--sampler-seed", "-1"], "--sampler-seed: "),
         (["bowl.toml", *GOAL, "--search", AT, "--check-seeds", "20:30"], "--check-seeds: .*20"),
         (["bowl.toml", *GOAL, "--search", AT, "--set", "duration_s=-1"], "--set duration_s=-1"),
         (["--resume", "nowhere"], "nowhere: "),
@@ -304,6 +290,7 @@ def test_tune_command_in_which_all_trials_fail_is_a_line_and_exit_code_1(tmp_pat
     code, out, errors = called(monkeypatch, capsys, "tune", scenario, *arguments)
     assert (code, out) == (1, "")
     assert re.fullmatch(r"error: \S+: all 2 trials failed.* trial 0: ValueError: too fast.*\n", errors)
+    assert not (folder / "best.toml").exists()
 
 
 def test_tuning_that_is_killed_leaves_no_worker_and_can_be_resumed(tmp_path, typed):

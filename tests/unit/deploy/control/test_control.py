@@ -20,6 +20,7 @@ from swarmwire.deploy.runs.live_address import (
     find_run,
     live_runs,
     runs_folder,
+    write_live,
 )
 from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from tests.support.clocks import until

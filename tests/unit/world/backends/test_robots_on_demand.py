@@ -252,8 +252,6 @@ def test_session_info_round_trips_with_the_free_robots(roster: Roster) -> None:
     assert free(roster)["flock"] == tuple(f"flock-{row}" for row in FLOCK)
 
 
-
-
 @pytest.mark.parametrize("fields", [{"names": ["\x1b[2J\n"]}, {"names": ["x" * 10**5]}, {"version": "\x1b" * 10**5}])
 def test_refusal_of_a_hostile_request_is_short_and_printable(fields: Any) -> None:
     with pytest.raises(JoinRefused) as caught:
