@@ -162,10 +162,3 @@ def test_latencies_that_are_not_uniform_are_drawn_and_become_a_table(tmp_path, m
     assert (code, errors) == (0, "")
     assert tomllib.loads(out[out.index("# Fitted to ") :])["radio"]["delays"]["distribution"] == "lognormal"
     assert picture.read_bytes().startswith(b"\x89PNG")
-
-
-def test_too_little_to_fit_is_refused(tmp_path, monkeypatch, capsys):
-    (tmp_path / "received.csv").write_text("t_s,tx,rx,seq\n1.0,a,b,1\n2.0,a,b,2\n")
-    code, out, errors = called(monkeypatch, capsys, "radio", "fit", tmp_path / "received.csv")
-    assert (code, out) == (2, "")
-    assert "range: needs 100 packets" in errors

@@ -306,11 +306,6 @@ def test_files_of_others_in_the_folder_are_left_alone(half, untouched):
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("seeds", []),
-        ("seeds", [1, 1]),
-        ("seeds", ["a", "b"]),
-        ("points", []),
-        ("points", [{"a": 0.0}, {"a": 1.0}]),
         ("point_overrides", [["radio.loss=0"]]),
         ("point_overrides", [[1], [2]]),
         ("robots", 0),
@@ -318,7 +313,6 @@ def test_files_of_others_in_the_folder_are_left_alone(half, untouched):
         ("batch", "few"),
         ("record_seeds", [77]),
         ("versions", []),
-        ("responses", [{"column": "order.final", "unit": "", "kind": "tome", "help": ""}]),
     ],
 )
 def test_campaign_json_with_an_invalid_key_is_refused(untouched, key, value):

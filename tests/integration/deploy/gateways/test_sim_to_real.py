@@ -28,8 +28,9 @@ class Case:
     duration_s: float
     judged: tuple[str, ...]  # by these numbers
 
-    def overrides(self, robots: int) -> tuple[str, ...]:
-        return f"duration_s={self.duration_s}", f"robots.{self.group}.count={robots}"
+    @property
+    def overrides(self) -> tuple[str, ...]:
+        return f"duration_s={self.duration_s}", f"robots.{self.group}.count={ROBOTS}"
 
 
 CASES = {
@@ -39,7 +40,7 @@ CASES = {
 }
 ALL = [(behaviour, body) for behaviour in CASES for body in ("epuck2", "turtlebot")] + [("avoidance", "turtlebot4")]
 ALWAYS = {("flocking", "epuck2"), ("avoidance", "turtlebot"), ("pso", "epuck2")}  # not only in slow tests
-QUICK, WHOLE = 5, 6  # robots
+ROBOTS = 5
 
 
 def scenario(behaviour: str, body: str) -> Path:
@@ -47,16 +48,12 @@ def scenario(behaviour: str, body: str) -> Path:
 
 
 @cache
-def spread(behaviour: str, body: str, robots: int, factor: float = 1.0) -> dict[str, FloatArray]:
+def spread(behaviour: str, body: str) -> dict[str, FloatArray]:
     """What runs with all agents in this process come to, by name, a number for each seed."""
-    speeds, case = Speeds(), stretched(CASES[behaviour], factor)
-    arenas = run(scenario(behaviour, body), seeds=SEEDS, overrides=case.overrides(robots), observers=[speeds]).arenas
+    speeds, overrides = Speeds(), CASES[behaviour].overrides
+    arenas = run(scenario(behaviour, body), seeds=SEEDS, overrides=overrides, observers=[speeds]).arenas
     found = [measured(arena, speeds.of(place)) for place, arena in enumerate(arenas)]
     return {name: np.array([of[name] for of in found]) for name in found[0]}
-
-
-def stretched(case: Case, factor: float) -> Case:
-    return Case(case.group, factor * case.duration_s, case.judged)
 
 
 def through_gateway(
@@ -64,14 +61,11 @@ def through_gateway(
     body: str,
     folder: Path,
     *,
-    robots: int = QUICK,
-    factor: float = 1.0,
     broken: bool = False,
     radio: str | None = None,
 ) -> tuple[dict[str, float], Result]:
     """What a run with its robots behind gateways comes to; tried once more at a lower pace if the machine lagged."""
-    case = stretched(CASES[behaviour], factor)
-    overrides = (*case.overrides(robots), f"seed={SEED}")
+    overrides = (*CASES[behaviour].overrides, f"seed={SEED}")
     more = {"overrides": overrides, "radio": radio, "broken": broken}
     for pace in PACES:
         speeds = Speeds()
@@ -90,7 +84,7 @@ def through_gateway(
     [pytest.param(*case, marks=() if case in ALWAYS else pytest.mark.slow) for case in ALL],
 )
 def test_agents_through_a_gateway_come_to_what_emulated_ones_do(behaviour, body, tmp_path) -> None:
-    expected = spread(behaviour, body, QUICK)
+    expected = spread(behaviour, body)
     found, result = through_gateway(behaviour, body, tmp_path)
     assert not outside(found, expected, CASES[behaviour].judged), (found, result.realtime, result.counts)
 
@@ -100,24 +94,15 @@ def test_agents_through_a_gateway_come_to_what_emulated_ones_do(behaviour, body,
     [pytest.param(*case, marks=() if case == ("flocking", "epuck2") else pytest.mark.slow) for case in ALL],
 )
 def test_driver_that_turns_the_wrong_way_is_outside_the_spread(behaviour, body, tmp_path) -> None:
-    expected = spread(behaviour, body, QUICK)
+    expected = spread(behaviour, body)
     found, _ = through_gateway(behaviour, body, tmp_path, broken=True)
     assert outside(found, expected, CASES[behaviour].judged), found
 
 
 def test_flock_over_the_robots_own_network_matches_an_emulated_one(tmp_path) -> None:
     """Range and bearing are from poses that the run tells as a tracker would."""
-    expected = spread("flocking", "epuck2", QUICK)
+    expected = spread("flocking", "epuck2")
     found, result = through_gateway("flocking", "epuck2", tmp_path, radio="zenoh")
     assert not outside(found, expected, CASES["flocking"].judged), (found, result.realtime, result.counts)
     assert result.radio is not None
     assert result.radio.sent == 0, "the medium of the run carried nothing"
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(600)
-@pytest.mark.parametrize(("behaviour", "body"), ALL)
-def test_longer_runs_through_a_gateway_come_to_what_emulated_ones_do(behaviour, body, tmp_path) -> None:
-    expected = spread(behaviour, body, WHOLE, 3.0)
-    found, result = through_gateway(behaviour, body, tmp_path, robots=WHOLE, factor=3.0)
-    assert not outside(found, expected, CASES[behaviour].judged), (found, result.realtime, result.counts)
