@@ -189,6 +189,25 @@ def test_messages_that_rmw_would_drop_are_counted():
         assert np.isnan(driver.sense(frozenset({"imu"}))["imu.turn_radps"][0])
 
 
+def test_disconnected_base_is_lost_and_reconnects_at_rest():
+    with base_and_driver("bridge") as (base, driver):
+        assert driver.counts()["reconnections"] == 0
+        base.close()
+        with pytest.raises(DriverLost, match="is cut"):
+            until(lambda: driver.sense(frozenset({"battery"})), lambda _: False)
+        with pytest.raises(DriverLost):
+            driver.act(Command(0.1))
+        driver.stop()
+        again = RosBase("bridge", endpoint=base.address)
+        try:
+            driver.open()
+            assert again.command() == (0.0, 0.0)
+            assert driver.counts()["reconnections"] == 1
+        finally:
+            driver.close()
+            again.close()
+
+
 @TRANSPORTS
 def test_driver_without_a_command_subscriber_is_lost(transport):
     base = RosBase(transport)
