@@ -392,11 +392,6 @@ def test_path_that_takes_no_table_is_refused_for_a_comparison(tmp_path, plain, n
         write_comparison(compared(plain, plain), tmp_path / name)
 
 
-def test_folder_with_an_at_sign_in_its_name_is_selected(tmp_path):
-    folder = write_campaign(tmp_path / "a@b=c")
-    assert len(select(str(folder)).points) == 3
-
-
 @pytest.mark.parametrize(
     ("first", "second", "key", "hint"),
     [

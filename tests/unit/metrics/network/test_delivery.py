@@ -2,7 +2,6 @@
 
 import json
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +17,7 @@ from swarmwire.metrics.records.run_folder.radio_totals import LinkCounts, RobotC
 from tests.support.comms.radio import make_medium, packets
 from tests.support.metrics.radio import radio_runs, rows_of
 from tests.support.metrics.recorded import links
-from tests.support.metrics.truths import departed, finished, in_each_tick, measured, static, tally, truth, watch
+from tests.support.metrics.truths import departed, finished, static, tally, truth, watch
 
 
 def tallied(of, *ticks, last=None):
@@ -111,14 +110,6 @@ def test_robot_counts_cover_packets_it_sent_and_those_meant_for_it():
     assert counts.received_bytes.tolist() == [0, 0, 0, 0, ended.size_bytes[0], 0]
 
 
-def test_link_counts_have_a_row_for_each_fate_that_occurred():
-    counts = LinkCounts(static(3, arenas=2))
-    counts.add(links([2, 0, 2], [1, 1, 1], [1, 1, 2], 0, fate=[Fate.RECEIVED, Fate.LOST, Fate.RECEIVED]))
-    counts.add(links([2, 2], [1, -1], [3, 4], 0, fate=[Fate.LOST, Fate.QUEUE_FULL], arena=1))
-    rows = np.column_stack(list(counts.columns().values())).tolist()
-    assert rows == [[0, 0, 1, Fate.LOST, 1], [0, 2, 1, Fate.RECEIVED, 2], [1, 2, 1, Fate.LOST, 1]]
-
-
 @settings(max_examples=25)
 @given(radio_runs())
 def test_robots_have_what_counters_have(run):
@@ -165,28 +156,6 @@ def test_links_have_what_a_counter_has_however_often_they_are_added_up(waiting, 
 
 MS = 1_000_000
 TICK_MS = 100
-
-
-def test_airtime_is_the_share_of_the_tick_that_a_robot_alive_is_on_air():
-    of = static(4, arenas=2)
-    two = departed([0, 2], on_air_at_ns=5 * MS, off_air_at_ns=15 * MS, arena=1)
-    assert measured("airtime", of, truth(of, departed=two)) == [0.0, pytest.approx(20 / (4 * TICK_MS))]
-    dead = np.array([True] * 6 + [False] * 2)
-    assert measured("airtime", of, truth(of, departed=two, alive=dead))[1] == pytest.approx(10 / (2 * TICK_MS))
-
-
-def test_airtime_of_a_long_packet_is_spread_over_its_ticks():
-    of, senders = static(2), ([0], [1], [], [])
-    gone = (departed(sender, off_air_at_ns=(250 - 200 * tick) * MS) for tick, sender in enumerate(senders))
-    found = in_each_tick(of, (truth(of, tick, departed=one) for tick, one in enumerate(gone)), "airtime").ravel()
-    assert found.tolist() == pytest.approx([0.5, (1.0 + 0.5) / 2, 0.25, 0.0])
-
-
-def test_throughput_counts_payload_once_for_each_that_received_it():
-    of = static(3, arenas=2)
-    told = links([0, 0, 1], [1, 2, 0], 0, 0, fate=[Fate.RECEIVED, Fate.RECEIVED, Fate.LOST])
-    told = replace(told, size_bytes=np.array([12, 12, 50]))
-    assert measured("throughput", of, truth(of, finished=told)) == [2 * 12 * 8 * 10.0, 0.0]
 
 
 def test_airtime_and_throughput_of_steady_senders_match_the_radio():

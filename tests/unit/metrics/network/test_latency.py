@@ -23,7 +23,7 @@ from swarmwire.metrics.measures.network.latency import (
 from tests.support.comms.radio import make_medium, packets
 from tests.support.metrics.radio import radio_runs, rows_of
 from tests.support.metrics.recorded import links
-from tests.support.metrics.truths import finished, in_each_tick, static, tally, truth
+from tests.support.metrics.truths import in_each_tick, static, truth
 
 MS = 1_000_000
 PERCENTS = (0.0, 50.0, 90.0, 99.0, 100.0)
@@ -48,32 +48,6 @@ def test_window_is_rounded_up_to_whole_ticks():
     for window_s, size in ((0.01, 1), (0.1, 1), (0.11, 2), (0.3, 3), (0.7, 7)):
         window = Window(static(1), window_s, 1)
         assert [int(window.add([[1]])[0, 0]) for _ in range(9)][-1] == size
-
-
-def test_ratios_count_intended_and_in_range_receivers_of_the_window_alone():
-    of = static(arenas=2)
-    counts = [
-        tally({Fate.RECEIVED: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 9}, {Fate.OUT_OF_RANGE: 2}),
-        tally({Fate.RECEIVED: 1, Fate.COLLIDED: 3}, {}),
-        tally({}, {Fate.LOST: 4}),
-        tally({}, {}),
-    ]
-    [pdr, link_pdr, _, _] = told(of, [truth(of, tick, tally=one) for tick, one in enumerate(counts)], window_s=0.2)
-    nan = np.nan
-    np.testing.assert_allclose(pdr, [[3 / 13, 0.0], [4 / 17, 0.0], [0.25, 0.0], [nan, 0.0]])
-    np.testing.assert_allclose(link_pdr, [[0.75, nan], [0.5, nan], [0.25, 0.0], [nan, 0.0]])
-
-
-def test_latencies_end_at_hearing_and_at_the_tick_in_which_the_receiver_acts():
-    of = static()
-    third = replace(of, groups=(replace(of.groups[0], act_every_ticks=3),))
-    seen = [truth(of, 1, finished=finished([40 * MS, 0], [65 * MS, 95 * MS])), truth(of, 2, finished=finished([], []))]
-    [_, _, air, agent] = told(third, seen, window_s=0.2)
-    assert air.ravel().tolist() == [pytest.approx(0.06)] * 2
-    assert agent.ravel().tolist() == [pytest.approx(0.28)] * 2
-    [_, _, air, agent] = told(of, seen, window_s=0.1)
-    assert air.ravel().tolist() == [pytest.approx(0.06), pytest.approx(np.nan, nan_ok=True)]
-    assert agent.ravel().tolist() == [pytest.approx(0.08), pytest.approx(np.nan, nan_ok=True)]
 
 
 @settings(max_examples=25)
@@ -137,20 +111,6 @@ def links_received(sender, receiver, sent_at_ms, fate=Fate.RECEIVED, arena=0):
     return links(sender, receiver, 0, [at * MS for at in sent_at_ms], fate=fate, arena=arena)
 
 
-def test_age_is_the_mean_over_pairs_of_the_time_since_the_newest_was_sent():
-    of = static(3, arenas=2)
-    nothing = links_received([], [], [])
-    told = [
-        nothing,
-        links_received([0, 0], [1, 2], [30, 40]),  # at 100 ms: ages of 70 and 60 ms
-        nothing,
-        links_received([0], [1], [210]),  # at 300 ms: 90 and 260 ms
-    ]
-    found = ages(of, [truth(of, tick, finished=one) for tick, one in enumerate(told)])
-    assert found[:, 0].tolist() == [pytest.approx(value, nan_ok=True) for value in (np.nan, 0.065, 0.165, 0.175)]
-    assert np.isnan(found[:, 1]).all()
-
-
 def received_at(sent_at_ms, final_at_ms):
     """Packets from robot 0 to 1."""
     columns = {"sent_at_ns": MS * np.array(sent_at_ms), "final_at_ns": MS * np.array(final_at_ms)}
@@ -168,36 +128,6 @@ def test_peak_age_is_the_age_just_before_a_newer_packet_came():
     seen = [truth(of, tick, finished=one) for tick, one in enumerate(told)]
     found = in_each_tick(of, seen, "peak_age_of_information")[:, 0]
     assert found.ravel().tolist() == [pytest.approx(value, nan_ok=True) for value in (np.nan, 0.14, 0.14, 0.16)]
-
-
-def test_pair_out_of_reach_ages_on():
-    of, nothing = static(2), links_received([], [], [])
-    apart = np.array([(0.0, 0.0, 0.0), (7.0, 0.0, 0.0)])  # the range is 2 m
-    seen = [truth(of, 1, finished=links_received([0], [1], [50]))]
-    seen += [truth(of, tick, finished=nothing, pose=apart) for tick in (2, 3)]
-    assert ages(of, seen).ravel().tolist() == [pytest.approx(value) for value in (0.05, 0.15, 0.25)]
-
-
-def test_overtaken_and_lost_packets_leave_the_age_unchanged():
-    of = static(2)
-    told = [
-        links_received([0, 0, 0], [1, 1, 1], [40, 80, 50]),
-        links_received([0, 0], [1, 1], [60, 150], fate=[Fate.RECEIVED, Fate.LOST]),
-    ]
-    found = ages(of, [truth(of, tick, finished=one) for tick, one in enumerate(told, 1)])
-    assert found.ravel().tolist() == [pytest.approx(0.02), pytest.approx(0.12)]
-
-
-def test_pairs_with_a_dead_robot_do_not_count_until_it_lives_again():
-    of, nothing = static(3), links_received([], [], [])
-    dead = np.array([False, True, True])
-    seen = [
-        truth(of, 1, finished=links_received([0, 1], [1, 2], [10, 80])),  # ages of 90 and 20 ms
-        truth(of, 2, finished=nothing, alive=dead),
-        truth(of, 3, finished=links_received([0], [2], [250]), alive=dead),  # still on its way when its sender died
-        truth(of, 4, finished=nothing),  # 390, 320 and 150 ms
-    ]
-    assert ages(of, seen).ravel().tolist() == [pytest.approx(value) for value in (0.055, 0.12, 0.22, 0.86 / 3)]
 
 
 def test_receivers_are_thinned_in_the_age_of_large_swarms(monkeypatch):
@@ -272,12 +202,6 @@ def percentiles_ns(durations_ns):
 def test_percentiles_are_numpys_within_the_stated_error(durations_ns):
     exact = np.percentile(durations_ns, PERCENTS, method="inverted_cdf")
     np.testing.assert_allclose(percentiles_ns(durations_ns), exact, rtol=RELATIVE_ERROR * (1 + 1e-9))
-
-
-def test_percentiles_of_many_latencies_are_numpys_within_the_stated_error():
-    durations_ns = np.random.default_rng(3).lognormal(np.log(0.1e9), 1.0, 20_000).astype(np.int64)
-    exact = np.percentile(durations_ns, PERCENTS, method="inverted_cdf")
-    np.testing.assert_allclose(percentiles_ns(durations_ns), exact, rtol=RELATIVE_ERROR)
 
 
 def test_percentiles_of_no_latencies_are_nan():

@@ -181,19 +181,6 @@ def test_however_short_the_range_the_bins_reach_across_the_arena_and_are_few(ran
     assert 20 <= counts.intended.shape[1] <= 2002
 
 
-def test_everybody_alive_is_meant_by_a_broadcast_however_far_away_and_only_one_by_an_addressed_packet():
-    of = static(4)
-    pose = line(0.0, 0.55, 1.55, 3.95)
-    alive = np.array([True, True, True, False])
-    ended = links([0], [1], 0, TICK_NS - 1)
-    told = {"departed": departed([0], intended=2, out_of_range=1), "finished": ended}
-    counts = seen_by(of, {"pose": pose, "alive": alive}, {"pose": line(9.0, 9.0, 9.0, 9.0), **told})
-    assert counts.width_m == pytest.approx(0.1)
-    assert (bins(counts.intended), bins(counts.received)) == ({5: 1, 15: 1}, {5: 1})
-    addressed = {"departed": departed([0], intended=1, to=2), "finished": links([], [], 0, 0)}
-    assert bins(seen_by(of, {"pose": pose, **addressed}).intended) == {15: 1}
-
-
 def test_distance_counts_leave_out_packets_that_never_went_on_air():
     refused = departed([0], fate=Fate.QUEUE_FULL)
     told = {"departed": refused, "finished": links([0], [-1], 0, 0, fate=Fate.QUEUE_FULL, receivers=3)}

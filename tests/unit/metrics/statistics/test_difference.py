@@ -150,13 +150,6 @@ def test_distances_are_those_of_scipy(name):
     assert wasserstein_1(a, b) == pytest.approx(stats.wasserstein_distance(a, b), rel=1e-9, abs=1e-12)
 
 
-def test_wasserstein_distance_of_a_shift_is_the_shift():
-    a = DRAWS.normal(size=500)
-    assert wasserstein_1(a, a + 0.25) == pytest.approx(0.25)
-    assert kolmogorov_smirnov(a, a + 100.0) == 1.0
-    assert kolmogorov_smirnov(a, a[::-1]) == wasserstein_1(a, a[::-1]) == 0.0
-
-
 def test_distance_to_an_empty_sample_is_nan():
     assert np.isnan(kolmogorov_smirnov(np.zeros(0), np.ones(3)))
     assert np.isnan(wasserstein_1(np.ones(3), np.zeros(0)))

@@ -1,7 +1,5 @@
 """Who is together: clusters, flocks of one hop, and when most of the swarm had come together."""
 
-from dataclasses import replace
-
 import networkx as nx
 import numpy as np
 import pytest
@@ -9,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.metrics.measures.swarm.aggregation import AggregationHop, AggregationRatio, AggregationTime
-from tests.support.metrics.swarms import mixed, said, stand, swarms, told
+from tests.support.metrics.swarms import said, stand, swarms, told
 
 RADIUS_M = stand((0, 0)).of.groups[0].body.radius_m
 gaps = st.sampled_from([None, 0.01, 0.4, 2.0])
@@ -42,35 +40,10 @@ def test_within_one_hop_it_is_that_of_the_algorithm(swarm, gap_m):
     assert said(AggregationHop(gap_m=gap_m), swarm) == pytest.approx(values, nan_ok=True)
 
 
-def test_star_is_one_flock_by_either_measure_and_a_chain_is_not():
-    apart_m = 3.9 * RADIUS_M
-    star = [(0, 0), (apart_m, 0), (-apart_m, 0), (0, apart_m), (0, -apart_m)]
-    assert said("aggregation", stand(*star)) == said("aggregation_hop", stand(*star)) == [1.0]
-    chain = [(apart_m * k, 0) for k in range(5)]
-    assert said("aggregation", stand(*chain)) == [1.0]
-    assert said("aggregation_hop", stand(*chain)) == [pytest.approx(3 / 5)]  # {0, 1}, then {2, 1, 3}, then {4, 3}
-
-
-def test_within_one_hop_the_numbers_of_robots_decide():
-    apart_m = 3.9 * RADIUS_M
-    assert said("aggregation_hop", stand((0, 0), (apart_m, 0), (-apart_m, 0))) == [1.0]
-    assert said("aggregation_hop", stand((-apart_m, 0), (0, 0), (apart_m, 0))) == [pytest.approx(2 / 3)]
-
-
 @pytest.mark.parametrize(("diameters", "share"), [(1.99, 1.0), (2.01, 0.5)])
 def test_by_default_the_gap_is_a_diameter_from_surface_to_surface(diameters, share):
     two = stand((0, 0), (2.0 * RADIUS_M * diameters, 0))
     assert said("aggregation", two) == said("aggregation_hop", two) == [share]
-
-
-def test_aggregation_gap_of_mixed_bodies_is_the_mean_diameter():
-    two = stand((0, 0), (1, 0))
-    both = replace(two, of=mixed(two.of, 1))
-    sum_m = sum(group.body.radius_m for group in both.of.groups)
-    for apart_m, share in ((1.99 * sum_m, 1.0), (2.01 * sum_m, 0.5)):
-        pose = both.pose.copy()
-        pose[1, 0] = apart_m
-        assert said("aggregation", replace(both, pose=pose)) == [share]
 
 
 TICK_S = 0.1
@@ -88,20 +61,6 @@ def at_ticks(together, robots=5):
 def time_s(together, robots=5, **parameters):
     of, ticks = at_ticks(together, robots)
     return told(AggregationTime(**parameters), *ticks, of=of)
-
-
-@pytest.mark.parametrize(
-    ("together", "hold_s", "exact"),
-    [
-        ([1, 2, 4, 1, 5], 0.0, 0.2),
-        ([1, 2, 3, 1, 3], 0.0, np.nan),
-        ([5, 1], 0.0, 0.0),
-        ([4, 1, 4, 4, 1, 4, 4, 4], 0.2, 0.5),
-        ([4, 1, 4, 4, 1, 4, 4], 0.2, np.nan),
-    ],
-)
-def test_aggregation_time_is_the_start_of_the_first_held_stretch(together, hold_s, exact):
-    assert time_s(together, hold_s=hold_s) == [pytest.approx(exact, nan_ok=True)]
 
 
 @pytest.mark.parametrize(

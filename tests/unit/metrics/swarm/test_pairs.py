@@ -250,36 +250,6 @@ def test_deadlocked_robot_is_one_that_drives_without_moving():
     assert after(robots(still, gone, still, still), robots(AHEAD, AHEAD, TURN, ASIDE)) == [0.5]
 
 
-def test_deadlocked_robot_may_go_to_and_fro():
-    dither = path((0, 0))
-    dither[1::2, 0] = 0.03
-    back = AHEAD * np.where(np.arange(11) % 2, -1, 1)[:, None]
-    assert after(robots(dither), robots(back)) == [1.0]
-
-
-def test_before_a_window_has_passed_nobody_knows():
-    still = robots(path((0, 0), ticks=10))
-    assert np.isnan(after(still, robots(AHEAD[:10]))).all()
-
-
-def test_dead_robots_are_not_deadlocked_and_had_no_command():
-    place, command = robots(path((0, 0)), path((0, 0))), robots(AHEAD, AHEAD)
-    alive = np.ones((11, 2), np.bool_)
-    alive[-1, 1] = False
-    assert after(place, command, alive=alive) == [1.0]
-    alive[:] = True
-    alive[:7, 1] = False
-    assert after(place, command, alive=alive) == [0.5]
-    assert np.isnan(after(place, command, alive=np.zeros((11, 2), np.bool_))).all()
-
-
-def test_deadlocked_robot_may_cross_the_seam_of_a_torus():
-    place = robots(path((0.002, 0), start=(3.99, 0)))
-    place = rolled(place)
-    assert after(place, robots(AHEAD), boundary="torus") == [1.0]
-    assert after(place, robots(AHEAD)) == [0.0]
-
-
 @settings(max_examples=50)
 @given(st.integers(0, 1000), st.integers(2, 30), st.sampled_from(["walls", "torus"]))
 def test_deadlocked_robots_are_those_of_the_definition(seed, ticks, boundary):

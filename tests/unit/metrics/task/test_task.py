@@ -34,13 +34,6 @@ def test_consensus_error_is_the_deviation_of_living_robots_with_a_value():
     assert found[:, 0, 0].tolist() == pytest.approx([nan, 0.0, 2.0], nan_ok=True)
 
 
-def test_consensus_bias_is_the_drift_from_the_mean_of_first_values():
-    nan = np.nan
-    values = [[0.0, 4.0, nan], [1.0, 4.0, 8.0], [4.0, 4.0, 4.0], [4.0, 4.0, 4.0]]
-    alive = [[True] * 3] * 3 + [[False] * 3]
-    assert both(static(3), values, alive)[:, 1, 0].tolist() == pytest.approx([0.0, 13 / 3 - 4, 0.0, nan], nan_ok=True)
-
-
 @given(st.integers(1, 3), st.integers(1, 6), st.data())
 def test_consensus_error_and_bias_are_those_of_numpy(arenas, robots, data):
     rows = arenas * robots
@@ -208,22 +201,6 @@ def test_coverage_is_that_of_testing_every_cell_against_every_robot(seed, bounda
     alive = rng.random((3, 6)) < 0.7
     found = shares(of, ticks, alive, sensing_m=sensing_m, cell_m=cell_m)
     np.testing.assert_array_equal(found, brute_force(of, ticks, alive, sensing_m, cell_m))
-
-
-def test_coverage_of_a_robot_is_a_disc():
-    of = replace(static(1), arena_size_m=(10.0, 10.0))
-    assert shares(of, [[(0.3, -0.2)]], sensing_m=2.0, cell_m=0.05)[0, 0] == pytest.approx(np.pi * 4 / 100, rel=0.01)
-    assert shares(of, [[(5.0, 5.0)]], sensing_m=2.0, cell_m=0.05)[0, 0] == pytest.approx(np.pi / 100, rel=0.01)
-    torus = replace(of, boundary="torus")
-    assert shares(torus, [[(5.0, 5.0)]], sensing_m=2.0, cell_m=0.05)[0, 0] == pytest.approx(np.pi * 4 / 100, rel=0.01)
-
-
-def test_coverage_only_rises_and_dead_robots_cover_nothing():
-    of = replace(static(2), arena_size_m=(4.0, 1.0))
-    ticks = [[(-1.5, 0), (1.5, 0)], [(-1.5, 0), (-0.5, 0)], [(0.5, 0), (1.5, 0)], [(0.5, 0), (1.5, 0)]]
-    alive = [[True, False], [True, True], [True, False], [False, False]]
-    found = shares(of, ticks, alive, sensing_m=0.1, cell_m=1.0)
-    assert found.ravel().tolist() == [0.25, 0.5, 0.75, 0.75]
 
 
 def test_coverage_of_a_large_sensing_range_is_all_at_once():
