@@ -52,18 +52,12 @@ def test_root_distribution_depends_on_all_parts() -> None:
     assert brought == {f"swarmwire-{part}" for part in PARTS}
 
 
-@pytest.mark.parametrize("folder", ["world", "metrics"])
-def test_world_and_metrics_depend_on_comms_alone_of_ours(folder: str) -> None:
-    ours = {distribution(line) for line in requirements(project(folder)) if "swarmwire" in line}
-    assert ours == {"swarmwire-comms"}
-
-
-def test_agent_part_depends_on_comms_alone() -> None:
-    assert [distribution(line) for line in project("agent")["dependencies"]] == ["swarmwire-comms"]
-
-
-def test_comms_depends_on_none_of_ours() -> None:
-    assert not any("swarmwire" in line for line in requirements(project("comms")))
+@pytest.mark.parametrize(
+    ("part", "brought"),
+    [("comms", set()), *((part, {"swarmwire-comms"}) for part in ("agent", "world", "metrics"))],
+)
+def test_part_depends_on_no_other_of_ours_but_comms(part: str, brought: set[str]) -> None:
+    assert {distribution(line) for line in requirements(project(part)) if "swarmwire" in line} == brought
 
 
 def test_namespace_package_has_no_init() -> None:
@@ -132,8 +126,3 @@ def test_banned_calls_are_refused_by_ruff_in_every_part(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 1, done.stderr
     assert {line.split(":")[0] for line in done.stdout.splitlines() if " TID251 " in line} == set(files)
-
-
-@pytest.mark.parametrize("name", ["run", "sync", "uv"])
-def test_ci_scripts_are_executable(name: str) -> None:
-    assert (ROOT / ".ci" / name).stat().st_mode & 0o111
