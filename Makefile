@@ -69,8 +69,8 @@ validation: ## compare the radio with ns-3, whose wheel this installs, and write
 	$(RUN) python -m benchmarks.ns3 --page docs/dev/validation.md
 
 .PHONY: soak
-soak: sync ## fuzz every input, then random faults, then an hour of a hundred processes: under two hours
-	HYPOTHESIS_PROFILE=soak $(RUN) pytest -q -s tests/integration/test_fuzz.py
+soak: sync ## fuzz every input, then random faults, then an hour of a hundred processes: two hours
+	HYPOTHESIS_PROFILE=soak $(RUN) pytest -q -s tests/integration/test_fuzz.py tests/integration/test_soak.py
 	$(RUN) python -m tests.tools.soak
 
 .PHONY: mutants

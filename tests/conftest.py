@@ -19,7 +19,7 @@ from _pytest.runner import runtestprotocol
 from hypothesis import HealthCheck, Phase, settings
 
 # The first example may wait for the compiler. `quick` is for `make test`, `full` for `make test-all`, `soak` for
-# `make soak`, in which tests/integration/test_fuzz.py runs for a quarter of an hour.
+# `make soak`, in which tests/integration/test_fuzz.py runs for a quarter of an hour, test_soak.py for half an hour.
 _SHARED: dict[str, Any] = {
     "deadline": None,
     "derandomize": True,

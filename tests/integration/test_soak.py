@@ -1,38 +1,62 @@
-"""A schedule of faults is played, and the checks of the soak find what must not be."""
+"""Schedules of faults are played, and the checks of the soak find what must not be.
+
+With HYPOTHESIS_PROFILE=soak, as in `make soak`, there are up to a hundred schedules of a kind.
+"""
 
 import subprocess
 import sys
-from dataclasses import replace
+from random import Random  # noqa: TID251 - as Hypothesis gives to the rules
+from typing import Any
 
+import polars as pl
 import pytest
+from hypothesis import Phase, settings
+from hypothesis.stateful import run_state_machine_as_test
 
 from swarmwire.world.backends.runner_reports import NOT_READY
 from tests.support.deploy.runs import record_run
 from tests.tools.soak import invariants
 from tests.tools.soak.invariants import Broken
-from tests.tools.soak.plan import draw
-from tests.tools.soak.plays import play
-from tests.tools.soak.samples import Sample, flatness
+from tests.tools.soak.samples import growths
+from tests.tools.soak.schedules import JoinedRunners, KilledCampaign, StartedRunners
 
 ROBOTS = ("a", "b")
 JOINED = ("joined", "r0", ROBOTS, -1)
-FLAT = Sample(0.0, "a world", 0, 400.0, 200.0, 60, 38, 0.0, 20.0, 0)
+FLAT = {"process_name": "a world", "rss_mib": 400.0, "descriptors": 60, "threads": 38, "tick_ms": 20.0}
 
 
-def test_schedule_is_drawn_from_its_seed_and_passes(tmp_path):
-    plan = draw(8)
-    assert plan == draw(8)
-    assert (plan.family, bool(plan.faults)) == ("wait", True)
-    assert all(play(plan, tmp_path))
+PROFILE = settings.get_current_profile_name()
 
 
-def test_schedules_have_every_family_and_every_fault():
-    plans = [draw(seed) for seed in range(1, 201)]
-    assert {plan.family for plan in plans} == {
-        "wait", "goes on", "real time", "own runners", "world killed", "campaign"
-    }  # fmt: skip
-    faults = {fault.kind for plan in plans for fault in plan.faults}
-    assert faults == {"killed", "frozen", "frozen too long", "slowed", "leaves"}
+@pytest.mark.skipif(PROFILE != "soak", reason="takes half an hour")
+@pytest.mark.timeout(0)
+@pytest.mark.parametrize(
+    ("machine", "steps", "schedules"), [(JoinedRunners, 8, 120), (StartedRunners, 6, 40), (KilledCampaign, 3, 20)]
+)
+def test_accounts_hold_in_each_schedule_of_faults(machine: Any, steps: int, schedules: int) -> None:
+    phases = (Phase.generate, Phase.shrink)
+    run_state_machine_as_test(
+        machine, settings=settings(max_examples=schedules, stateful_step_count=steps, phases=phases)
+    )
+
+
+def test_accounts_hold_while_runners_are_lost():
+    schedule = JoinedRunners()
+    schedule.start_world("wait", {3}, 0, has_router=False, in_real_time=False, ending="SIGTERM")
+    for trouble in ("runner_killed", "runner_frozen_too_long", "agent_killed"):
+        schedule.disturb_runner(trouble, Random(1))
+        schedule.accounts_go_on()
+    schedule.disturb_world("world_frozen", Random(1))
+    schedule.disturb_observer("observer_killed", Random(1))
+    schedule.teardown()
+
+
+def test_accounts_hold_after_a_run_is_killed():
+    schedule = StartedRunners()
+    schedule.start_run("coast", 2, ending="SIGKILL")
+    schedule.disturb_runner("runner_leaves", Random(1))
+    schedule.disturb_world("loss_set", Random(1))
+    schedule.teardown()
 
 
 def summary(*changes):
@@ -92,9 +116,9 @@ def test_soak_finds_remaining_processes_and_files(tmp_path):
     command = (sys.executable, "-c", "input()")
     with subprocess.Popen(command, env={"TMPDIR": str(tmp_path)}, stdin=subprocess.PIPE) as process:
         with pytest.raises(Broken, match=f"left: {process.pid} "):
-            invariants.check_no_process(tmp_path, 0)
+            invariants.check_no_process(tmp_path)
         process.communicate(b"\n")
-    assert invariants.check_no_process(tmp_path, 0)
+    assert invariants.check_no_process(tmp_path)
     assert invariants.check_no_file(tmp_path)
     (tmp_path / "sw-1").mkdir()
     with pytest.raises(Broken):
@@ -103,9 +127,14 @@ def test_soak_finds_remaining_processes_and_files(tmp_path):
 
 @pytest.mark.parametrize(
     ("growth", "expected"),
-    [({}, set()), ({"rss_mib": 0.01}, set()), ({"rss_mib": 0.1}, {"memory, MiB"}), ({"threads": 1}, {"threads"})],
+    [
+        ({}, set()),
+        ({"rss_mib": 0.01}, set()),
+        ({"rss_mib": 0.1}, {"memory, MiB"}),
+        ({"threads": 1}, {"threads"}),
+    ],
 )
 def test_soak_finds_growth_over_an_hour(growth, expected):
-    hour = [replace(FLAT, at_s=10.0 * n, tick=100 * n, cpu_s=3.0 * n) for n in range(361)]
-    rows = [replace(s, **{key: getattr(s, key) + n * by for key, by in growth.items()}) for n, s in enumerate(hour)]
-    assert {f.quantity for f in flatness({"a world": rows}, 3600.0) if not f.holds} == expected
+    hour = [{**FLAT, "at_s": 10.0 * n, "tick": 100 * n, "cpu_s": 3.0 * n} for n in range(361)]
+    rows = [row | {name: row[name] + n * by for name, by in growth.items()} for n, row in enumerate(hour)]
+    assert {item["quantity"] for item in growths(pl.DataFrame(rows)) if not item["holds"]} == expected

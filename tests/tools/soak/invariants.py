@@ -1,6 +1,7 @@
 """Invariants of every run, whatever happened to it: functions that raise Broken with the reason."""
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,6 @@ from swarmwire.metrics.records.run_folder.layout import SCENARIO
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.backends.runner_reports import NOT_READY
-from tests.tools.soak.processes import family
 
 COMES = ("joined", "returned")
 GOES = ("left", "lost")
@@ -24,10 +24,6 @@ SOMEBODY = "one of its own"
 
 class Broken(Exception):
     """An invariant that does not hold."""
-
-
-class Late(Broken):
-    """Something did not happen within its time limit, as also happens to processes that get too little of a core."""
 
 
 def check_fates(summary: Mapping[str, Any]) -> str:
@@ -104,19 +100,21 @@ def check_undisturbed(folder: Path) -> str:
     return f"{summary['ticks']} ticks as without faults"
 
 
-def check_no_process(temporary: Path, parent: int) -> str:
-    """Check that no process of the run is alive, not even an orphan."""
-    left = {child.pid: child for child in family(parent)}
-    for process in psutil.process_iter():
-        try:
-            if process.pid != parent and process.environ().get("TMPDIR") == str(temporary):
-                left[process.pid] = process
-        except psutil.Error:  # gone by now, or somebody else's
-            continue
-    named = [f"{pid} {' '.join(_command(child))[:80]}" for pid, child in left.items() if _goes_on(child)]
-    if named:
-        raise Broken(f"left: {'; '.join(named)}")
+def check_no_process(temporary: Path) -> str:
+    """Check that no process of the run is alive, not even an orphan: its temporary files are in this folder."""
+    if left := processes_with(temporary):
+        raise Broken(f"left: {'; '.join(left)}")
     return "no process left"
+
+
+def processes_with(temporary: Path) -> list[str]:
+    """Process ids and commands of processes, but zombies, whose temporary files are in this folder."""
+    processes: list[str] = []
+    for process in psutil.process_iter():
+        with suppress(psutil.Error):  # gone by now, or somebody else's
+            if process.environ().get("TMPDIR") == str(temporary) and process.status() != psutil.STATUS_ZOMBIE:
+                processes.append(f"{process.pid} {' '.join(process.cmdline())[:80]}")
+    return processes
 
 
 def check_no_file(temporary: Path, *, killed: bool = False) -> str:
@@ -148,17 +146,3 @@ def read_summary(folder: Path) -> Mapping[str, Any]:
     if summary is None:
         raise Broken("there is no summary")
     return summary
-
-
-def _goes_on(process: psutil.Process) -> bool:
-    try:
-        return process.status() != psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
-        return False
-
-
-def _command(process: psutil.Process) -> list[str]:
-    try:
-        return process.cmdline()
-    except psutil.NoSuchProcess:
-        return []

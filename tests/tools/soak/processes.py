@@ -57,6 +57,11 @@ class Supervised:
         self.again_s = float("inf")
         self._due_ns = sys.maxsize
 
+    def come(self) -> None:
+        """Start it, if it never ran."""
+        if self.starts == 0:
+            self._due_ns = 0
+
     def after(self, again_s: float) -> None:
         """Set the time from an end to the restart."""
         self.again_s = again_s
@@ -133,6 +138,11 @@ class Agenda:
     def __init__(self) -> None:
         self._due: list[tuple[int, int, Steps]] = []
         self._serial = count()
+
+    @property
+    def is_empty(self) -> bool:
+        """True if no step is to come."""
+        return not self._due
 
     def begin(self, steps: Steps, now_ns: int) -> None:
         """Run the first step now, the next ones when they are due."""

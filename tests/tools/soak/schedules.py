@@ -1,161 +1,338 @@
-"""`python -m tests.tools.soak.schedules --count 200 --seed 1`: random schedules of faults, each in its own process.
+"""Schedules of faults as Hypothesis state machines: the rules are troubles, the invariants are the accounts of the run.
 
-A schedule that fails is named with its seed; `--only SEED` plays it alone, and shows what it does.
-
-One that passes a time limit, and breaks nothing else, is played once more after all others, alone. If it holds then,
-it was starved: it had too little of the machine. Any other broken invariant counts at once.
+A schedule is a short run whose processes are killed, frozen, slowed and interrupted, and come back. Hypothesis shrinks
+one that fails, and prints its calls. Its files stay in the folder that is printed.
 """
 
-import argparse
-import contextlib
-import faulthandler
-import json
-import os
 import shutil
 import signal
 import sys
 import tempfile
-import threading
-import traceback
 from collections import Counter
-from collections.abc import Generator, Iterable
-from dataclasses import dataclass
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
+from random import Random  # noqa: TID251 - Hypothesis draws by the same interface
+from typing import Any
 
-from swarmwire.comms.base.clock import WallClock, to_ns, to_s
-from tests.tools.soak.invariants import Broken, Late
-from tests.tools.soak.plan import draw
-from tests.tools.soak.plays import play
-from tests.tools.soak.processes import family
+from hypothesis import currently_in_test_context, note
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
+from swarmwire.comms.base.errors import SwarmwireError
+from swarmwire.deploy import repeat, sweep
+from swarmwire.metrics.records.run_folder.table import TableState
+from swarmwire.metrics.records.run_folder.verify import verify
+from tests.support.clocks import until
+from tests.support.deploy.campaign import rows_in, scenario_in, series_in
+from tests.tools.soak import invariants
+from tests.tools.soak.invariants import Broken, processes_with
+from tests.tools.soak.processes import PYTHON, Steps, Supervised, environment, family
+from tests.tools.soak.site import Course, Kind, Site
+from tests.tools.soak.troubles import RUNNER_TROUBLES, WORLD_TROUBLES, Troubles
 
-def main() -> int:
-    """Play schedules; the exit code is 0 if all passed."""
-    parser = argparse.ArgumentParser("python -m tests.tools.soak.schedules", description=__doc__)
-    parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=1, help="of the first; the others follow")
-    parser.add_argument("--jobs", type=int, default=2, help="how many are played at the same time")
-    parser.add_argument("--only", type=int, metavar="SEED", help="this one, here")
-    parser.add_argument("--out", type=Path, help="a file for a line of each, as it is over")
-    options = parser.parse_args()
-    if options.only is not None:
-        return play_one(options.only)
-    return play_all(range(options.seed, options.seed + options.count), options.jobs, options.out)
+ROBOTS = 8
+TIMEOUT_S = 1.5  # timeout of a runner
+SPEED = 2.0  # simulated seconds in a second
+ENDINGS = {
+    "stop": 130,
+    "SIGKILL": -9,
+    "SIGTERM": 130,
+    "SIGINT": 130,
+    "SIGHUP": 129,
+}  # how a run ends, and its exit code
 
-
-LIMIT_S = 600.0  # limit of one schedule on a busy machine
-EACH_S = 0.05
-HELD, BROKEN, LATE, HUNG = 0, 1, 3, -1
-WORDS = {HELD: "held", LATE: "LATE", HUNG: "HUNG"}  # all other exit codes: BROKEN
-
-
-@dataclass(frozen=True)
-class Playing:
-    """A schedule that is being played."""
-
-    seed: int
-    log: Path
-    began_ns: int
+DRAWS = st.randoms(note_method_calls=True)
+SHORT_S = st.sampled_from((0.0, 0.1, 0.5, 2.0))
 
 
-def play_one(seed: int) -> int:
-    """Play a schedule in this process; HELD, BROKEN or LATE."""
-    plan = draw(seed)
-    print(f"{seed}: {plan}", flush=True)
-    faulthandler.dump_traceback_later(LIMIT_S - 10.0)
+def told(*words: object) -> None:
+    """Print what happens in a schedule; of those that Hypothesis draws, only in the one that fails."""
+    (note if currently_in_test_context() else print)(" ".join(map(str, words)))
+
+
+def new_folder() -> Path:
+    """A folder for the files of a schedule, which stay if it fails."""
     folder = Path(tempfile.mkdtemp(prefix="schedule-"))
-    try:
-        held = play(plan, folder)
-    except Broken as broken:
-        code = LATE if isinstance(broken, Late) else BROKEN
-        print(f"{'LATE' if code == LATE else 'BROKEN'}: {broken}; its files: {folder}", flush=True)
-        return code
-    finally:
-        faulthandler.cancel_dump_traceback_later()
-    shutil.rmtree(folder)
-    print("held: " + "; ".join(held), flush=True)
-    return 0
+    told("files:", folder)
+    return folder
 
 
-def play_all(seeds: Iterable[int], jobs: int, out: Path | None) -> int:
-    """Play all, so many at the same time, then those that were late once more, alone: 0 if all held or were starved."""
-    tally, broken, late = Counter[str](), list[int](), list[int]()
-    to_come = list(seeds)
-    count = len(to_come)
-    for seed, code in _played(to_come, jobs, out):
-        late += [seed] * (code in (LATE, HUNG))
-        broken += [seed] * (code not in (HELD, LATE, HUNG))
-        tally[f"{draw(seed).family}: {WORDS.get(code, 'BROKEN')}"] += 1
-        print(f"{sum(tally.values())}/{count}", flush=True)
-    again = dict(_played(late, 1, out))
-    broken += [seed for seed, code in again.items() if code != HELD]
-    starved = [seed for seed, code in again.items() if code == HELD]
-    for name, times in sorted(tally.items()):
-        print(f"{name:24} {times}")
-    print(f"{count - len(broken)} of {count} held; starved, and held when played alone: {starved}; broken: {broken}")
-    return 1 if broken else 0
+class DisturbedRun(RuleBasedStateMachine):
+    """A run whose world and observer are disturbed; subclasses disturb its runners."""
+
+    site: Site
+
+    def start(self, kind: Kind, on_loss: str, ending: str, options: Sequence[str] = ()) -> None:
+        """Start all, until the first tick is over."""
+        self.folder = new_folder()
+        self.temporary = self.folder.absolute() / "tmp"
+        self.on_loss, self.ending = on_loss, ending
+        self._last: dict[str, int] = {}
+        self.in_real_time = "--realtime" in options
+        place = "robots.swarm.place={ how = 'disc', radius_m = 2.0 }"
+        values = (place, f"run.on_runner_loss={on_loss}", f"run.runner_timeout_s={TIMEOUT_S}")
+        sets = [word for value in values for word in ("--set", value)]
+        kind = Kind(**{**vars(kind), "options": (*sets, "--no-rrd", *options)})
+        self.site = Site(kind, self.folder / "site", environment(self.temporary))
+        self.troubles = Troubles(self.site, told, TIMEOUT_S)
+        self.site.observe(["observer"])
+        self.course = Course(self.site)
+        self.course.until(self.status, "the run to begin")
+        if not self.in_real_time:
+            self.site.ask(lambda run: run.speed(SPEED))
+        self.course.until(lambda: (self.status() or {"tick": 0})["tick"] > 0, "the first tick")
+
+    @rule(for_s=SHORT_S)
+    def wait(self, for_s: float) -> None:
+        """Let the run go on."""
+        self.course.pass_time(for_s)
+
+    @rule(trouble=st.sampled_from(list(WORLD_TROUBLES)), draws=DRAWS)
+    def disturb_world(self, trouble: str, draws: Random) -> None:
+        """Freeze or pause the world, or order an event."""
+        self.begin(self.troubles.named(trouble, draws))
+
+    @rule(trouble=st.sampled_from(["observer_killed", "observer_frozen"]), draws=DRAWS)
+    def disturb_observer(self, trouble: str, draws: Random) -> None:
+        """Kill or freeze the observer."""
+        self.begin(self.troubles.named(trouble, draws))
+
+    @invariant()
+    def world_goes_on(self) -> None:
+        """No trouble ends the world, unless it stops for a lost runner."""
+        assert self.on_loss == "stop" or self.site.world.pid is not None, self.site.log_text("world")[-600:]
+
+    @invariant()
+    def nothing_crashes(self) -> None:
+        """Processes end by request, by a kill, or with a reason; runners and world print no traceback."""
+        invariants.check_exit_codes(self.site.exit_codes)
+        for process in (*self.site.runners, self.site.world):
+            text = self.site.log_text(process.name)
+            if "Traceback" in text and "KeyboardInterrupt" not in text:
+                raise Broken(f"{process.name}: {text[text.index('Traceback') :][-600:]}")
+
+    @invariant()
+    def accounts_go_on(self) -> None:
+        """Ticks and counts never fall, and each robot is somebody's or free."""
+        status = self.status()
+        if status is not None:
+            present = {"tick": status["tick"], **status["counts"]}
+            fallen = {name: last for name, last in self._last.items() if present.get(name, last) < last}
+            assert not fallen, f"{fallen} became {present}"
+            assert 0 <= status["runners"]["robots_free"] <= ROBOTS
+            self._last = present
+
+    def teardown(self) -> None:
+        """End the run, and check what remains of it."""
+        if not hasattr(self, "site"):
+            return
+        has_failed = sys.exc_info()[0] is not None
+        try:
+            if not has_failed:
+                self.course.recover()
+                self.course.end(None if self.ending == "stop" else signal.Signals[self.ending])
+                self.course.until(lambda: not processes_with(self.temporary), "all processes to end")
+                self.check()
+        finally:
+            self.site.close()
+        if not has_failed:
+            shutil.rmtree(self.folder)
+
+    def check(self) -> None:
+        """The accounts of a run that has ended."""
+        run, world = self.site.folder, self.site.world
+        was_lost = self.on_loss == "stop" and world.codes == [1]
+        if world.codes != [ENDINGS[self.ending]] and not was_lost:
+            raise Broken(f"{self.ending}: exit codes {world.codes}; {self.site.log_text('world')[-600:]}")
+        self.nothing_crashes()
+        if world.codes == [-signal.SIGKILL]:
+            self._check_remains(run)
+        else:
+            summary = invariants.read_summary(run)
+            if summary["ended"] != ("failed" if was_lost else "interrupted"):
+                raise Broken(f"it ended as {summary['ended']}")
+            invariants.check_fates(summary)
+            self.check_owners(summary)
+            invariants.check_folder(run)
+            waits = self.on_loss == "wait" and not self.in_real_time
+            (invariants.check_undisturbed if waits else invariants.check_repeat)(run)
+        invariants.check_no_process(self.temporary)
+        invariants.check_no_file(self.temporary, killed=self.ending == "SIGKILL")
+
+    def check_owners(self, summary: Any) -> None:
+        """Check that each robot had one runner."""
+        kind = self.site.kind
+        names = [f"swarm-{at}" for at in range(ROBOTS)]
+        invariants.check_owners(summary, names, all_played=not kind.late, has_own_runners=kind.starts_runners)
+
+    def _check_remains(self, run: Path) -> None:
+        """What a killed world leaves can be read and repeated."""
+        bad = [part for part in verify(run) if part.state in (TableState.DAMAGED, TableState.DIFFERS)]
+        if bad:
+            raise Broken("; ".join(f"{part.part}: {part.state}, {part.text}" for part in bad))
+        for path in (self.temporary / "own" / "swarmwire").glob("*.json"):
+            path.unlink()  # the next search for runs removes them
+        again = repeat(run)
+        if again.same is False:
+            raise Broken(f"repeat differs from tick {again.first_difference} on")
+
+    def begin(self, steps: Steps) -> None:
+        """Begin a trouble, which goes on during the next rules."""
+        self.course.begin(steps)
+        self.wait(0.1)
+
+    def status(self) -> dict[str, Any] | None:
+        """The status of the run, if it has one."""
+        try:
+            return self.site.ask(lambda run: run.status())
+        except SwarmwireError:
+            return None
 
 
-def _played(seeds: list[int], jobs: int, out: Path | None) -> Generator[tuple[int, int]]:
-    """Play these, so many at the same time: the seed and exit code of each as it is over."""
-    clock, to_come, now = WallClock(), list(seeds), dict[int, Playing]()
-    with tempfile.TemporaryDirectory(prefix="schedules-") as folder:
-        while to_come or now:
-            while to_come and len(now) < jobs:
-                seed = to_come.pop(0)
-                log = Path(folder, str(seed))
-                now[_started(seed, log)] = Playing(seed, log, clock.now_ns())
-            for pid, playing in list(now.items()):
-                took_ns = clock.now_ns() - playing.began_ns
-                code = _code(pid, is_late=took_ns > to_ns(LIMIT_S))
-                if code is None:
-                    continue
-                del now[pid]
-                log, how = playing.log.read_text(errors="replace"), WORDS.get(code, "BROKEN")
-                if code != HELD:
-                    print(log)
-                print(f"seed {playing.seed}: {how}, {draw(playing.seed).family}, {to_s(took_ns):.1f} s", flush=True)
-                if out is not None:
-                    with out.open("a") as file:
-                        file.write(json.dumps([playing.seed, code, round(to_s(took_ns), 1), log]) + "\n")
-                yield playing.seed, code
-            threading.Event().wait(EACH_S)
+class JoinedRunners(DisturbedRun):
+    """Runners that join a world, directly or behind a router, before or after its first tick."""
+
+    @initialize(
+        on_loss=st.sampled_from(["wait", "coast", "stand"]),
+        cuts=st.sets(st.integers(1, ROBOTS - 1), min_size=1, max_size=3),
+        late=st.integers(0, 3),
+        has_router=st.booleans(),
+        in_real_time=st.booleans(),
+        ending=st.sampled_from(list(ENDINGS)),
+    )
+    def start_world(
+        self, on_loss: str, cuts: set[int], late: int, *, has_router: bool, in_real_time: bool, ending: str
+    ) -> None:
+        """Start the world with up to four runners."""
+        ends = [*sorted(cuts), ROBOTS]
+        robots = tuple(end - first for first, end in zip([0, *ends], ends, strict=False))
+        late = 0 if on_loss == "wait" else min(late, len(cuts))
+        options = ["--realtime", f"{SPEED:g}"] if in_real_time else []
+        options += ["--start-with", str(sum(robots[: len(robots) - late]))] if late else []
+        self.start(Kind("world", robots, late=late, has_router=has_router), on_loss, ending, options)
+
+    @rule(trouble=st.sampled_from(list(RUNNER_TROUBLES)), draws=DRAWS)
+    def disturb_runner(self, trouble: str, draws: Random) -> None:
+        """Kill, freeze or slow a runner or its agent, or let it leave and come back."""
+        self.begin(self.troubles.named(trouble, draws))
+
+    @precondition(lambda self: self.site.router is not None)
+    @rule(trouble=st.sampled_from(["router_killed", "router_frozen"]), draws=DRAWS)
+    def disturb_router(self, trouble: str, draws: Random) -> None:
+        """Kill or freeze the router."""
+        self.begin(self.troubles.named(trouble, draws))
+
+    @precondition(lambda self: any(not runner.starts for runner in self.site.runners))
+    @rule()
+    def late_runner_joins(self) -> None:
+        """Start a runner that was late."""
+        next(runner for runner in self.site.runners if not runner.starts).come()
+        self.wait(0.1)
 
 
-def _started(seed: int, log: Path) -> int:
-    """The process id of a child that plays a schedule. This process has no session of zenoh, or the child had none."""
-    sys.stdout.flush()
-    child = os.fork()
-    if child:
-        return child
-    code = 1
-    try:
-        output = os.open(log, os.O_WRONLY | os.O_CREAT)
-        os.dup2(output, 1)
-        os.dup2(output, 2)
-        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup's would make the schedule's processes deaf to it, too
-        code = play_one(seed)
-    except BaseException:  # noqa: BLE001 - the last frame of this process
-        traceback.print_exc()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(code)
+class StartedRunners(DisturbedRun):
+    """Agent processes that the run starts, and that do not come back."""
+
+    @initialize(
+        on_loss=st.sampled_from(["stop", "dead", "stand", "coast"]),
+        runners=st.integers(2, 4),
+        ending=st.sampled_from(list(ENDINGS)),
+    )
+    def start_run(self, on_loss: str, runners: int, ending: str) -> None:
+        """Start the run with its runners."""
+        robots = (ROBOTS - runners + 1, *[1] * (runners - 1))
+        self.start(Kind("run", robots, starts_runners=True), on_loss, ending)
+
+    @precondition(lambda self: self.site.disturbed)
+    @rule(
+        trouble=st.sampled_from(["runner_killed", "runner_leaves", "runner_frozen", "runner_frozen_too_long"]),
+        draws=DRAWS,
+    )
+    def disturb_runner(self, trouble: str, draws: Random) -> None:
+        """Kill, end or freeze an agent process."""
+        self.begin(self.troubles.named(trouble, draws))
 
 
-def _code(pid: int, *, is_late: bool) -> int | None:
-    """The exit code of a child; None while it goes on. One that is late is killed with all that it started."""
-    ended, status = os.waitpid(pid, os.WNOHANG)
-    if ended:
-        return os.waitstatus_to_exitcode(status)
-    if not is_late:
-        return None
-    for playing in family(pid):
-        with contextlib.suppress(Exception):
-            playing.kill()
-    os.kill(pid, signal.SIGKILL)
-    os.waitpid(pid, 0)
-    return HUNG
+LIMIT_S = 240.0
+SEEDS, LOSSES = 6, [0.0, 0.5]
+LONG = "duration_s=20"
+KILLS = ("worker", "SIGKILL", "SIGINT", "SIGTERM")
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+class KilledCampaign(RuleBasedStateMachine):
+    """A campaign, or a worker of it, that is killed and resumed."""
+
+    @initialize()
+    def make_scenario(self) -> None:
+        """Write the scenario."""
+        self.folder = new_folder()
+        self.temporary = self.folder.absolute() / "tmp"
+        self._env = {**environment(self.temporary), "PYTHONFAULTHANDLER": "1"}
+        self._scenario, self._campaign = scenario_in(self.folder), self.folder / "campaign"
+
+    @rule(after_s=st.sampled_from((2.0, 4.0, 1.0, 7.0)), victim=st.sampled_from(KILLS))
+    def kill(self, after_s: float, victim: str) -> None:
+        """Start or resume the campaign, and kill it or a worker; without a worker it goes on."""
+        process = self._started()
+        try:
+            process.ended_within(after_s)
+            workers = family(process.pid) if victim == "worker" and process.pid else []
+            if workers:
+                workers[-1].kill()
+            elif victim != "worker":
+                process.send(signal.Signals[victim])
+            self._await_end(process)
+        finally:
+            process.kill()
+            process.end()
+
+    def teardown(self) -> None:
+        """Resume the campaign to its end: it has each run once, as one that was left alone."""
+        if not hasattr(self, "folder") or sys.exc_info()[0] is not None:
+            return
+        process = self._started()
+        try:
+            self._await_end(process)
+        finally:
+            process.kill()
+            code = process.end()
+        log_text = (self.folder / "sweep.log").read_text(errors="replace")
+        assert code == 0, f"the last resume ended with {code}: {log_text[-600:]}"
+        rows, series = undisturbed_campaign()
+        assert rows_in(self._campaign) == rows
+        assert series_in(self._campaign).equals(series, null_equal=True)
+        invariants.check_no_process(self.temporary)
+        invariants.check_no_file(self.temporary)
+        shutil.rmtree(self.folder)
+
+    def _started(self) -> Supervised:
+        arguments = (str(self._scenario), "--vary", "radio.loss=0,0.5", "--seeds", str(SEEDS), "--set", LONG, "--batch",
+                     "2", "--out", str(self._campaign))  # fmt: skip
+        if (self._campaign / "campaign.json").exists():
+            arguments = ("--resume", str(self._campaign), "--retry-failed")
+        command = (*PYTHON, "swarmwire.deploy", "sweep", *arguments, "--workers", "2", "--quiet")
+        process = Supervised("sweep", lambda: command, self.folder / "sweep.log", self._env)
+        process.tend(0)
+        return process
+
+    def _await_end(self, process: Supervised) -> None:
+        """Return when it and its workers have ended; a log of its stacks tells why it takes too long."""
+        try:
+            assert process.ended_within(LIMIT_S)
+            until(lambda: not processes_with(self.temporary))
+        except AssertionError:
+            process.send(signal.SIGABRT)
+            process.end()
+            raise Broken((self.folder / "sweep.log").read_text(errors="replace")[-6000:]) from None
+
+
+@cache
+def undisturbed_campaign() -> tuple[list[dict[str, Any]], Any]:
+    """Rows and series of the campaign without faults."""
+    with tempfile.TemporaryDirectory(prefix="schedule-") as folder:
+        sweep(scenario_in(Path(folder)), out=Path(folder, "campaign"), seeds=SEEDS, vary={"radio.loss": LOSSES},
+              overrides=[LONG], batch=2, workers=1)  # fmt: skip
+        rows = rows_in(Path(folder, "campaign"))
+        assert Counter(row["run"] for row in rows) == Counter(range(SEEDS * len(LOSSES)))
+        return rows, series_in(Path(folder, "campaign"))
