@@ -247,7 +247,7 @@ AHEAD, TURN, ASIDE = np.tile([0.1, 0, 0], (11, 1)), np.tile([0, 1.0, 0], (11, 1)
 
 def test_deadlocked_robot_is_one_that_drives_without_moving():
     still, gone = path((0, 0)), path((0.01, 0))
-    assert after(robots(still, gone, still, still), robots(AHEAD, AHEAD, TURN, ASIDE)) == [0.5]
+    assert after(robots(still, gone, still, still, still), robots(AHEAD, AHEAD, TURN, TURN, ASIDE)) == [0.4]
 
 
 @settings(max_examples=50)
