@@ -1,11 +1,10 @@
 """Agents that attack: the socket to their host, other processes, and files of the run. Each robot has one attack.
 
-The file imports nothing of the project but what agents import, so that it attacks any version.
+The file imports nothing of the project but what agents import.
 """
 
 import ctypes
 import gc
-import importlib
 import json
 import os
 import signal
@@ -65,15 +64,9 @@ def packet(sender: int, to: int = -1, status: int = -1, size: int = 4) -> bytes:
     return struct.pack("<4q", sender, to, status, size)
 
 
-def table(name: str, rows: list[Any], values: list[Any], slots: list[int] | None = None) -> bytes:
-    """The msgpack of a table, in the format of the running version."""
-    slots = [0] * len(rows) if slots is None else slots
-    try:
-        importlib.import_module("swarmwire.agent.process_answers")
-    except ImportError:
-        numbers = [float(at) for at in range(len(values))] if name == "notes" else values
-        return msgpack.packb({"tables": {name: (rows, slots, numbers)}, "states": values if name == "notes" else []})
-    return msgpack.packb({name: (rows, values) if name == "notes" else (rows, slots, values)})
+def table(name: str, rows: list[Any], values: list[Any]) -> bytes:
+    """The msgpack of a table."""
+    return msgpack.packb({name: (rows, values) if name == "notes" else (rows, [0] * len(rows), values)})
 
 
 ANSWERS: dict[str, Callable[[int, int], list[bytes]]] = {  # attack: messages in place of an answer
