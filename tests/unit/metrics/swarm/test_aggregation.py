@@ -40,6 +40,12 @@ def test_within_one_hop_it_is_that_of_the_algorithm(swarm, gap_m):
     assert said(AggregationHop(gap_m=gap_m), swarm) == pytest.approx(values, nan_ok=True)
 
 
+def test_within_one_hop_the_numbers_of_robots_decide():
+    apart_m = 3.9 * RADIUS_M
+    assert said("aggregation_hop", stand((0, 0), (apart_m, 0), (-apart_m, 0))) == [1.0]
+    assert said("aggregation_hop", stand((-apart_m, 0), (0, 0), (apart_m, 0))) == [pytest.approx(2 / 3)]
+
+
 @pytest.mark.parametrize(("diameters", "share"), [(1.99, 1.0), (2.01, 0.5)])
 def test_by_default_the_gap_is_a_diameter_from_surface_to_surface(diameters, share):
     two = stand((0, 0), (2.0 * RADIUS_M * diameters, 0))

@@ -41,6 +41,14 @@ def test_path_efficiency_of_line_return_and_half_circle_is_known():
     assert efficiency(half[:, None]) == [pytest.approx(2.0 / np.pi, rel=1e-4)]
 
 
+def test_path_efficiency_leaves_out_robots_that_did_not_move():
+    place = np.zeros((3, 2, 2))
+    place[:, 0, 0] = 0.0, 0.1, 0.2
+    place[:, 1, 0] = 0.0, 0.001, 0.0
+    assert efficiency(place) == [pytest.approx(1.0)]
+    assert np.isnan(efficiency(place[:, 1:])).all()
+
+
 def test_path_efficiency_of_a_random_walk_has_the_known_mean():
     """sqrt(pi / (4 n)) of n steps, as the order of n headings at random; its variance is below 0.22 / n.
 
