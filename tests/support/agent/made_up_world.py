@@ -33,7 +33,7 @@ class MadeUpWorld:
     """A world with set answers; None is a refusal. It sends frames to runners that are ready.
 
     Attributes:
-        holds: whether join requests wait until `go_on`.
+        holds: whether join requests get no answer.
     """
 
     def __init__(self, session: zenoh.Session, run: str, session_info: bytes | None, join: bytes | None) -> None:
@@ -60,12 +60,6 @@ class MadeUpWorld:
         self.join_requests.append(query.payload.to_bytes())
         if not self.holds:
             self._reply(query, self.keys.any_join)
-
-    def go_on(self) -> None:
-        """Answer all waiting and later requests."""
-        self.holds = False
-        while self._held:
-            self._reply(self._held.pop(), self.keys.any_join)
 
     def _reply(self, query: zenoh.Query, key: str) -> None:
         answer = self._replies[key]

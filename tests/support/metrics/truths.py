@@ -79,14 +79,10 @@ def tally(*fates: Mapping[Fate, int], sent: int = 1) -> PacketCounts:
     return PacketCounts(np.full(len(fates), sent, np.int64), intended, intended - table[:, Fate.OUT_OF_RANGE], table)
 
 
-def finished(
-    sent_at_ns: Sequence[int], final_at_ns: Sequence[int], fate: Fate = Fate.RECEIVED, arena: int = 0
-) -> ReceptionRecords:
+def finished(sent_at_ns: Sequence[int], final_at_ns: Sequence[int], fate: Fate = Fate.RECEIVED) -> ReceptionRecords:
     sent, final = np.array(sent_at_ns, np.int64), np.array(final_at_ns, np.int64)
     zero = np.zeros(len(sent), np.int64)
-    return ReceptionRecords(
-        zero + arena, zero, zero + 1, zero + 1, zero - 1, zero, sent, sent, final, zero + fate, zero, zero
-    )
+    return ReceptionRecords(zero, zero, zero + 1, zero + 1, zero - 1, zero, sent, sent, final, zero + fate, zero, zero)
 
 
 def watch(of: Static, ticks: Iterable[Truth], *observers: Any) -> None:
@@ -120,10 +116,8 @@ def departed(
     fate: Fate = Fate.RECEIVED,
     on_air_at_ns: int = 0,
     off_air_at_ns: int = 0,
-    to: int = BROADCAST,
-    sequence: int = 0,
     arena: int = 0,
 ) -> TransmissionRecords:
     """A packet of each of these senders."""
-    columns = (arena, sender, to, sequence, intended, out_of_range, int(fate), on_air_at_ns, off_air_at_ns)
+    columns = (arena, sender, BROADCAST, 0, intended, out_of_range, int(fate), on_air_at_ns, off_air_at_ns)
     return TransmissionRecords(*(np.array(column, np.int64) for column in np.broadcast_arrays(*columns)))
