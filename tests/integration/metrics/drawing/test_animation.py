@@ -196,42 +196,12 @@ def test_metrics_of_the_scenario_are_plotted_before_the_usual_ones():
     assert [plot.get_title(loc="left") for plot in axes] == ["coverage", "spread", "order"]
 
 
-def test_speed_of_a_film_is_shown_beside_its_time():
-    figure = FilmFigure(film(), 300, speed=2.0)
-    figure.frame(10)
-    assert figure._time.get_text() == "t = 1.0 s at 2 x"
-    figure = FilmFigure(film(), 300)
-    figure.frame(10)
-    assert figure._time.get_text() == "t = 1.0 s"
-
-
 def test_custom_metric_is_plotted_by_its_numbers_alone():
     axes = FilmFigure(film(metrics={"my_share": np.linspace(0.2, 0.5, 31)}), 300, ["my_share"])._figure.axes[1]
     low, high = axes.get_ylim()
     assert axes.get_title(loc="left") == "my share"
     assert low <= 0.0
     assert 0.5 < high < 0.6
-
-
-@pytest.mark.parametrize("size_m", [(1.0, 9.0), (9.0, 1.0), (40.0, 40.0)])
-def test_arenas_of_any_form_are_seen_whole(size_m):
-    static = replace(two_groups(), arena_size_m=size_m, obstacles=((),), lights=((),))
-    figure = FilmFigure(film(static=static, pose=np.zeros((31, 3, 3))), SIZE_PX)
-    image = figure.frame(0)
-    for x_m, y_m in ((-0.46, -0.46), (0.46, 0.46)):
-        assert color_at(figure, image, x_m * size_m[0], y_m * size_m[1]) == FLOOR
-
-
-def test_crowd_of_300_robots_is_drawn():
-    robots, ticks = 300, 20
-    static = replace(
-        two_groups(),
-        groups=(Group("crowd", load_body("epuck"), 0, robots),),
-        robot_names=tuple(f"crowd-{i}" for i in range(robots)),
-    )
-    pose = np.random.default_rng(1).uniform(-2.5, 2.5, (ticks, robots, 3))
-    of = film(static=static, pose=pose, alive=np.ones((ticks, robots), np.bool_), time_s=np.arange(ticks) / 10)
-    assert robots_shown(replace(of, metrics={}), ticks - 1)[-1] == robot_color(0)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.metrics.pictures.report.axes import column_axes, fits_log, set_share_limits
+from swarmwire.metrics.pictures.report.axes import fits_log
 from swarmwire.metrics.pictures.report.campaign import campaign_report
 from swarmwire.metrics.pictures.report.campaign_data import MAX_LEVELS, levels_of, rounding_of
 from swarmwire.metrics.pictures.report.campaign_models import FittedShape, resilience_curve, scaling_curve
@@ -291,13 +291,6 @@ def test_labels_stand_in_figures_and_unknown_ones_are_refused(tmp_path):
         campaign_report(folder, [], {"radio.los": "x"})
 
 
-@pytest.mark.parametrize(("least", "low"), [(0.0, 0.0), (0.3, 0.0), (-0.2, -0.2), (0.9, 0.892)])
-def test_axis_of_shares_starts_at_zero_unless_all_are_large(least, low):
-    _, axes = column_axes("share", "loss")
-    set_share_limits(axes, least, 0.98)
-    assert axes.get_ylim() == pytest.approx((low, 1.0 + 0.03 * (1.0 - low)))
-
-
 def test_scenario_name_with_markup_is_escaped_in_a_report(tmp_path):
     _, shown = of(ordinary(tmp_path, name="<script>alert(1)</script> & co"))
     assert "<script>alert(1)</script> & co" in shown.said
@@ -487,13 +480,3 @@ def test_share_curve_is_drawn_with_its_intervals():
     np.testing.assert_allclose(
         [segment[:, 1] for segment in drawn.get_segments()], [[0.7225, 1.0], [0.2366, 0.7634]], atol=1e-4
     )
-
-
-@pytest.mark.parametrize(("place", "side"), [(0.1, "left"), (0.95, "right")])
-def test_change_point_label_stays_within_the_figure(place, side):
-    x = np.array([0.0, 0.5, 1.0])
-    line = MedianLine("a", x, x, x, x, x, x, Jump(place, place, place))
-    figure = response_curve([line], "what", "x")
-    (number,) = figure.axes[0].texts
-    assert number.get_ha() == side
-    assert number.get_window_extent().x1 < figure.bbox.x1

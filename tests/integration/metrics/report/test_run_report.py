@@ -15,7 +15,7 @@ from swarmwire.metrics.pictures.report import run_timeline
 from swarmwire.metrics.pictures.report.page import Listing, ReportTable, blank_figure, svg_of
 from swarmwire.metrics.pictures.report.run import metric_statistics, run_report
 from swarmwire.metrics.pictures.report.run_data import Lane, Span, lanes_of, read_run, thinned
-from swarmwire.metrics.pictures.report.run_links import link_counts, link_histogram, link_matrix
+from swarmwire.metrics.pictures.report.run_links import link_counts, link_matrix
 from swarmwire.metrics.pictures.report.run_paths import MAX_PATHS, MAX_POINTS, Ending, paths_of, trajectories
 from swarmwire.metrics.pictures.report.run_radio import (
     delivery_by_distance,
@@ -23,7 +23,7 @@ from swarmwire.metrics.pictures.report.run_radio import (
     percentiles,
     receivers_act_at_ns,
 )
-from swarmwire.metrics.pictures.report.run_timeline import MAX_PANELS, Curve, small_panels, timeline
+from swarmwire.metrics.pictures.report.run_timeline import Curve, timeline
 from swarmwire.metrics.records.run_folder.layout import MetricInfo
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
@@ -282,13 +282,6 @@ def test_panels_share_their_time_and_hold_the_curves():
     assert above.lines[-1].get_xdata() == [4.0]
 
 
-def test_many_metrics_are_small_and_the_first_of_very_many():
-    curves = [Curve(f"own_{i}", f"own {i}", TIME_S * i) for i in range(MAX_PANELS + 3)]
-    figure = small_panels(TIME_S, curves)
-    assert [axes.get_title("left") for axes in figure.axes] == [f"own {i}" for i in range(MAX_PANELS)]
-    np.testing.assert_array_equal(figure.axes[2].lines[0].get_ydata(), TIME_S * 2)
-
-
 def events(*rows):
     names = ("do", "part", "time_s", "ended", "robots")
     return pl.DataFrame([dict(zip(names, row, strict=True)) for row in rows], infer_schema_length=None)
@@ -361,19 +354,6 @@ def test_trajectories_of_many_robots_stay_light(robots, most_bytes):
     assert len(svg_of(figure)) < most_bytes
 
 
-def test_trajectories_are_coloured_by_group_where_there_are_several_else_by_time():
-    of = two_groups()
-    place_m = np.random.default_rng(1).uniform(-3, 3, (30, 3, 2))
-    pose = np.zeros((3, 3))
-    arena = trajectories(of, 0, paths_of(place_m, of), Ending(pose, np.ones(3, np.bool_), None, 2.9)).axes[0]
-    assert [line.get_label() for line in arena.lines[:2]] == ["small", "large"]
-    alone = replace(of, groups=(replace(of.groups[0], stop=3),))
-    figure = trajectories(alone, 0, paths_of(place_m, alone), Ending(pose, np.ones(3, np.bool_), None, 2.9))
-    colors = [line.get_color() for line in figure.axes[0].lines[:6]]
-    assert len(set(colors)) == 6
-    assert "2.9 s" in [text.get_text() for text in figure.axes[1].texts]
-
-
 def test_ratios_over_distance_have_their_binomial_intervals():
     received, intended = np.array([9, 5, 0]), np.array([10, 10, 4])
     table = pl.DataFrame(
@@ -439,9 +419,3 @@ def test_link_matrix_has_a_square_per_link_and_names_of_few_robots():
     assert [label.get_text() for label in axes.get_yticklabels()] == ["left", "a-very-lon…"]
     many = link_matrix(static(40), np.full((40, 40), 0.5)).axes[0]
     assert [label.get_text() for label in many.get_yticklabels()] == ["flock"]
-
-
-def test_links_of_many_robots_are_counted_by_their_ratio():
-    axes = link_histogram(np.array([0.0, 0.5, 0.51, 1.0])).axes[0]
-    counts = axes.patches[0].get_data().values
-    assert (counts[0], counts[12], counts[-1], counts.sum()) == (1, 2, 1, 4)
