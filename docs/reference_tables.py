@@ -66,6 +66,19 @@ def details_of(kind: str) -> str:
     return "\n".join(parts)
 
 
+def event_tables() -> str:
+    """The keys that events share, then each event with its own keys."""
+    keys = {of.name: {key.name: key for each in of.tables for key in each.parameters} for of in entries("events")}
+    shared = {"at_s": keys["kill"]["at_s"], "for_s": keys["kill"]["for_s"]}
+    without = [code(name) for name, own in keys.items() if "for_s" not in own]
+    parts = [key_table(shared.values()), f"{' and '.join(without).capitalize()} have no `for_s`.\n"]
+    seen: set[str] = set()
+    for of in entries("events"):
+        own = [key for key in keys[of.name].values() if key.name not in (*shared, "do")]
+        parts += [f"### {code(of.name)}\n", f"{text_of(of)}\n", *_by_table(own, seen, "")]
+    return "\n".join(parts)
+
+
 def _setting(text: str) -> str:
     """The setting and the header of its table as code; any other text as it is."""
     return SETTING.sub(r"`\1` in `\2`", text)
@@ -90,10 +103,9 @@ def behaviour_table() -> str:
 
 
 def behaviour_details(name: str) -> str:
-    """One behaviour: its docstring, needs and parameters."""
+    """One behaviour: its needs, docstring and parameters."""
     of = next(of for of in entries("behaviours") if of.name == name)
-    facts = "".join(f"- {title}: {_setting(text)}\n" for title, text in of.facts)
-    return "\n".join([facts, text_of(of), "", *_tables(of, set())])
+    return "\n".join([f"Needs: {dict(of.facts)['needs']}\n", text_of(of), "", *_tables(of, set())])
 
 
 def _link_to_behaviour(name: str) -> str:
@@ -112,17 +124,39 @@ def _by_radio(of: CatalogueEntry) -> str:
 
 
 def body_table() -> str:
-    """Every figure of the bodies' sheets that differs from its key's default, with a column for each body."""
-    bodies, units, sheets = entries("bodies"), dict[str, str](), list[dict[str, str]]()
+    """Every figure of the bodies' sheets that differs from its key's default: a table per part, a column per body."""
+    bodies, units = entries("bodies"), dict[str, str]()
+    sheets, sensors = dict[str, dict[str, str]](), dict[str, list[str]]()
     for body in bodies:
         figures = {path: of for path, of in _figures(body).items() if of.value not in (None, _defaults().get(path))}
         units |= {path: of.unit for path, of in figures.items()}
-        facts = {title: text for title, text in body.facts if title.startswith("fastest")}
-        fitted = {of.title.replace("sensor: ", "sensors."): "yes" for of in body.tables if "sensor: " in of.title}
-        sheets.append(facts | fitted | {path: _figure(of.value) for path, of in figures.items()})
-    paths = sorted({path: None for sheet in sheets for path in sheet}, key=lambda path: path.startswith("sensors."))
-    rows = [[code(path), units.get(path, ""), *(sheet.get(path, "") for sheet in sheets)] for path in paths]
-    return table(["figure", "unit", *(code(of.name) for of in bodies)], rows)
+        speeds = {title: text for title, text in body.facts if title.startswith("fastest")}
+        sheets[body.name] = speeds | {path: _figure(of.value) for path, of in figures.items()}
+        for fitted in (of.title.removeprefix("sensor: ") for of in body.tables if "sensor: " in of.title):
+            sensors.setdefault(fitted, []).append(code(body.name))
+    parts: dict[str, dict[str, None]] = {}
+    for path in (path for sheet in sheets.values() for path in sheet):
+        parts.setdefault(_part_of_sheet(path), {})[path] = None
+    fitted_table = table(("sensor", "bodies"), [(code(name), ", ".join(names)) for name, names in sensors.items()])
+    by_part = {part: _part_table(part, list(paths), units, sheets) for part, paths in parts.items()}
+    return "\n".join([by_part.pop(""), fitted_table, *by_part.values()])
+
+
+def _part_of_sheet(path: str) -> str:
+    """Table of a data sheet that gets a table on the page: "leds", "sensors.scan"; "" for body and drive."""
+    first, *deeper = path.split(".")
+    return f"sensors.{deeper[0]}" if first == "sensors" else first if first in ("leds", "ros2") else ""
+
+
+def _part_table(part: str, paths: list[str], units: dict[str, str], sheets: dict[str, dict[str, str]]) -> str:
+    """The figures of a part, with a column for the bodies that have the same; none for bodies without figures."""
+    columns: dict[tuple[str, ...], list[str]] = {}
+    for name, sheet in sheets.items():
+        if not sheet.keys().isdisjoint(paths):
+            columns.setdefault(tuple(sheet.get(path, "") for path in paths), []).append(code(name))
+    head = [code(f"[{part}]") if part else "figure", "unit", *(", ".join(names) for names in columns.values())]
+    names = [code(path.removeprefix(f"{part}.")) for path in paths]
+    return table(head, zip(names, (units.get(path, "") for path in paths), *columns, strict=True))
 
 
 def _figures(body: CatalogueEntry) -> dict[str, CatalogueParameter]:
@@ -318,7 +352,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "body-sources": lambda: facts_of("bodies", "source"),
     "commands": command_tables,
     "drives": lambda: details_of("drives"),
-    "events": lambda: details_of("events"),
+    "events": event_tables,
     "fates": lambda: rows_of("fates"),
     "fields": lambda: rows_of("fields", "bytes on air"),
     "keys": keys_of,

@@ -33,7 +33,7 @@ BEGIN = ("run", "point", "seed")
 ENDS = ("ended", "stop_time_s", "stopped_by", "sim_time_s")  # those that a campaign has
 LAST = ("timing_wall_s",)
 MAX_BYTES = 2_000_000  # of all digests of an experiment: they are kept with the code
-LONG_ROWS = 8  # a table with at least as many is a CSV file
+LONG_ROWS, LONG_CELLS = 8, 35  # a table with at least as many of either is a CSV file
 TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 BEGIN_MARK, END_MARK = "<!-- numbers -->", "<!-- /numbers -->"
 
@@ -133,7 +133,7 @@ def page_files(page: Path, told: str) -> dict[Path, str]:
 
     def replacement(table: re.Match[str]) -> str:
         rows = [re.split(r"(?<!\\)\|", line.strip())[1:-1] for line in table[0].splitlines()]
-        if len(rows) - 2 < LONG_ROWS:
+        if len(rows) - 2 < LONG_ROWS and (len(rows) - 2) * len(rows[0]) < LONG_CELLS:
             return table[0]
         file = page.parent / "numbers" / f"{page.stem}-{len(files) + 1}.csv"
         files[file] = csv_text([[cell.strip().replace(r"\|", "|") for cell in row] for row in (rows[0], *rows[2:])])

@@ -24,7 +24,7 @@ from swarmwire.deploy.robots.certificates.member import member
 from swarmwire.deploy.robots.certificates.register import certificate_request
 from swarmwire.deploy.runs.control_server import ControlServer, Status
 from swarmwire.deploy.runs.controls import Controls
-from swarmwire.deploy.runs.live_address import read_live
+from swarmwire.deploy.runs.live_address import Announcement, read_live
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from swarmwire.metrics.records.run_folder.reader import RunFolder
