@@ -18,6 +18,7 @@ from docs.behaviours.shown import SHOWN, page_of
 from docs.experiments.experiment import HERE, Experiment, Places, find_experiment
 from docs.experiments.experiment import names as experiments
 from docs.experiments.making import digests, page_files
+from docs.field_checks import field_comments
 from docs.pictures.radio.__main__ import FIGURES
 from docs.prose_checks import prose
 from docs.protocol_checks import protocol_page
@@ -202,6 +203,7 @@ CHECKS: tuple[Callable[[], Problems], ...] = (
     benchmark_rows,
     fleet_keys,
     robot_bytes,
+    field_comments,
     protocol_page,
     prose,
 )

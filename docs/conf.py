@@ -33,7 +33,7 @@ smartquotes = False  # --set and "none" stay as they are typed
 default_role = "code"  # docstrings write `name`, as Markdown does
 autodoc_class_signature = "separated"
 autodoc_member_order = "bysource"
-autodoc_default_options = {"members": True, "exclude-members": "__init__, __new__"}
+autodoc_default_options = {"members": True, "undoc-members": True, "exclude-members": "__init__, __new__"}
 autodoc_preserve_defaults = True
 
 nitpicky = True

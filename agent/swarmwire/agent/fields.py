@@ -24,8 +24,8 @@ class Vectors:
     They can be added, and multiplied by a number or an array: `0.6 * pull - 3.0 * near`.
     """
 
-    x: FloatArray  # forward, (k,) for packets or (n,) for robots
-    y: FloatArray  # leftward
+    x: FloatArray  #: forward, (k,) for packets or (n,) for robots
+    y: FloatArray  #: leftward
 
     __array_ufunc__ = None  # an array on the left then multiplies all vectors at once
 

@@ -21,7 +21,7 @@ M = TypeVar("M", covariant=True)
 class TxStatus:
     """The result of one unicast packet, to the knowledge of the sender's radio."""
 
-    id: int  # returned by `send`
+    id: int  #: returned by `send`
     result: TxResult
 
     @property
@@ -58,7 +58,7 @@ class Columns:
 class Packets(Generic[M]):
     """All packets of one message class that n robots received, k rows sorted by robot, then by time."""
 
-    message: Columns  # every field of the message under its name, (k,) each
+    message: Columns  #: every field of the message under its name, (k,) each
 
     def __init__(
         self, robots: int, table: ReceivedPackets, fields: dict[str, FloatArray], needs: tuple[str, ...]
@@ -187,7 +187,7 @@ class Packet(Generic[M]):
 
     __slots__ = ("_index", "_lists", "message")
 
-    message: M  # the message, frozen; a dict is a copy
+    message: M  #: the message, frozen; a dict is a copy
 
     def __init__(self, lists: ReceivedLists, index: int, message: M) -> None:
         self._lists, self._index, self.message = lists, index, message

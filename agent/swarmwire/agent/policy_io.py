@@ -46,13 +46,13 @@ class PolicyIO:
     `neighbours` senders that it received since its last step.
     """
 
-    sensors: tuple[str, ...] = ()  # names of the body's sensors, in this order
-    measures: tuple[str, ...] = ()  # measurements of packets: radio.range, radio.bearing, radio.rssi
-    neighbours: int = 0  # maximum number of neighbours whose messages it sees
-    order: Literal["nearest", "newest"] = "newest"  # neighbours that come first; further ones are ignored
-    message: int = 0  # numbers from -1 to 1 that the policy sends
-    shared: tuple[str, ...] = ()  # names from `sensors`: their numbers are sent with each message
-    speed_mps: float | None = None  # speed at the action 1; None: the body's limit
+    sensors: tuple[str, ...] = ()  #: names of the body's sensors, in this order
+    measures: tuple[str, ...] = ()  #: measurements of packets: radio.range, radio.bearing, radio.rssi
+    neighbours: int = 0  #: maximum number of neighbours whose messages it sees
+    order: Literal["nearest", "newest"] = "newest"  #: neighbours that come first; further ones are ignored
+    message: int = 0  #: numbers from -1 to 1 that the policy sends
+    shared: tuple[str, ...] = ()  #: names from `sensors`: their numbers are sent with each message
+    speed_mps: float | None = None  #: speed at the action 1; None: the body's limit
     turn_radps: float | None = None
 
     def __post_init__(self) -> None:
@@ -146,15 +146,14 @@ class PolicyLayout:
 
     An action is: forward speed and turn rate (of a holonomic drive: forward, to the left, turn) as shares of the limits
     from -1 to 1, then the numbers to send. Speeds that a drive cannot have together are scaled down together.
-
-    Attributes:
-        io: the choice.
-        body: the robots' body.
-        observation: the name of each number of an observation.
-        low: the lowest value of each number.
-        high: the highest value of each number.
-        action: the name of each number of an action, from -1 to 1.
     """
+
+    io: PolicyIO  #: the choice of numbers
+    body: Body  #: the robots' body
+    observation: tuple[str, ...]  #: the name of each number of an observation
+    low: Float32Array  #: the lowest value of each number of an observation
+    high: Float32Array  #: the highest value of each number of an observation
+    action: tuple[str, ...]  #: the name of each number of an action, from -1 to 1
 
     def __init__(self, io: PolicyIO, body: Body) -> None:
         """Build the layout; BadInput if the body lacks a sensor."""
@@ -171,8 +170,8 @@ class PolicyLayout:
         numbers = [number for column in self._columns for number in column.numbers]
         numbers += [(f"neighbour {k} {name}", low, high) for k in range(io.neighbours) for name, low, high in slot]
         self.observation = tuple(name for name, _, _ in numbers)
-        self.low: Float32Array = np.array([low for _, low, _ in numbers], np.float32)
-        self.high: Float32Array = np.array([high for _, _, high in numbers], np.float32)
+        self.low = np.array([low for _, low, _ in numbers], np.float32)
+        self.high = np.array([high for _, _, high in numbers], np.float32)
         self._holonomic = isinstance(body.drive, Holonomic)
         drive = ("forward", "left", "turn") if self._holonomic else ("forward", "turn")
         self.action = (*drive, *(f"v{k}" for k in range(io.message)))

@@ -26,7 +26,7 @@ class Robot(RobotHandle[float]):
         super().__init__(context)
         self._row = row
         self._draw: Draw | None = None
-        self.radio = RadioPort(context, row)
+        self.radio = RadioPort(context, row)  #: the robot's radio
 
     @property
     def draw(self) -> Draw:

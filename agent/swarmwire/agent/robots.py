@@ -97,8 +97,8 @@ class Robots(RobotHandle[FloatArray]):
 
     def __init__(self, context: GroupContext) -> None:
         super().__init__(context)
-        self.radio = RadioRows(context)
-        self.draw = Draws(context.keys, context.tick, context.first_draw)
+        self.radio = RadioRows(context)  #: the radios of the robots
+        self.draw = Draws(context.keys, context.tick, context.first_draw)  #: the random draws of the robots
 
     @property
     def n(self) -> int:

@@ -55,11 +55,11 @@ class Trial:
     starts with defaults when it returns.
     """
 
-    robots: int = 7  # size of the group
-    ticks: int = 12  # a tenth of a second each
-    seed: int = 1  # for readings, reception and the robots' draws
-    body: str | Body = "epuck"  # the name of a bundled body, or any body
-    params: dict[str, Any] | None = None  # those of a scenario: a list has a value for each robot
+    robots: int = 7  #: size of the group
+    ticks: int = 12  #: a tenth of a second each
+    seed: int = 1  #: for readings, reception and the robots' draws
+    body: str | Body = "epuck"  #: the name of a bundled body, or any body
+    params: dict[str, Any] | None = None  #: those of a scenario: a list has a value for each robot
 
     @cached_property
     def spec(self) -> Body:

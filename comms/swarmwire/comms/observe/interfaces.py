@@ -37,11 +37,9 @@ class Observer:
     """A passive part of a run: a metric, a recorder, a progress display. It cannot change the run.
 
     Subclasses override the methods that they need.
-
-    Attributes:
-        before_agents: True if `begin` is called before the run waits for agents that join from elsewhere.
     """
 
+    #: True if `begin` is called before the run waits for agents that join from elsewhere.
     before_agents = False
 
     def begin(self, static: Static) -> None:

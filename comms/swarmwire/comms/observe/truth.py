@@ -22,7 +22,7 @@ class Light:
 
     x_m: float
     y_m: float
-    intensity_m: float  # reach of the light: ARGoS's I in exp(-2 d / I)
+    intensity_m: float  #: reach of the light: ARGoS's I in exp(-2 d / I)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Group:
     body: Body
     start: int
     stop: int
-    act_every_ticks: int = 1  # the robots act when the tick modulo this is 0
+    act_every_ticks: int = 1  #: the robots act when the tick modulo this is 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,16 +41,16 @@ class Static:
     """Constant facts of a run. Robot row r is robot r % robots of arena r // robots."""
 
     name: str
-    seeds: tuple[int, ...]  # (arenas,) seed of each arena
+    seeds: tuple[int, ...]  #: (arenas,) seed of each arena
     rate_hz: int
-    arena_size_m: tuple[float, float]  # full extents; the origin is the centre
+    arena_size_m: tuple[float, float]  #: full extents; the origin is the centre
     boundary: Boundary
-    obstacles: tuple[tuple[Obstacle, ...], ...]  # (arenas,) obstacles of each arena
+    obstacles: tuple[tuple[Obstacle, ...], ...]  #: (arenas,) obstacles of each arena
     groups: tuple[Group, ...]
-    robot_names: tuple[str, ...]  # (robots,) name of each index in an arena
-    range_m: float | None = None  # range of the radio; None: no radio
-    lights: tuple[tuple[Light, ...], ...] = ()  # (arenas,) lights of each arena; empty: no lights
-    floor: Floor | None = None  # floor of all arenas; None: white
+    robot_names: tuple[str, ...]  #: (robots,) name of each index in an arena
+    range_m: float | None = None  #: range of the radio; None: no radio
+    lights: tuple[tuple[Light, ...], ...] = ()  #: (arenas,) lights of each arena; empty: no lights
+    floor: Floor | None = None  #: floor of all arenas; None: white
 
     @property
     def walled(self) -> bool:
@@ -99,13 +99,13 @@ BATTERY_EMPTY = "run_down"  # action of the event that batteries are empty, whic
 class EventRecord:
     """An event that began in this tick, or that ended because its duration is over."""
 
-    serial: int  # index in the scenario, or NO_SERIAL
-    at_s: float  # time in the scenario; start of the tick if `singly`
-    do: str  # action of the scenario, or BATTERY_EMPTY
-    ended: bool  # True: the event ended in this tick
-    changed: BoolArray  # (rows,) True for the robots that the event changed
-    part: str = ""  # failing part; empty for other actions
-    singly: bool = False  # True: each robot has its own time, and arenas without a changed robot are not affected
+    serial: int  #: index in the scenario, or NO_SERIAL
+    at_s: float  #: time in the scenario; start of the tick if `singly`
+    do: str  #: action of the scenario, or BATTERY_EMPTY
+    ended: bool  #: True: the event ended in this tick
+    changed: BoolArray  #: (rows,) True for the robots that the event changed
+    part: str = ""  #: failing part; empty for other actions
+    singly: bool = False  #: True: each robot has its own time, and arenas without a changed robot are not affected
 
     @property
     def words(self) -> str:
@@ -123,21 +123,21 @@ class Truth:
 
     tick: int
     time_ns: int
-    running: BoolArray  # (arenas,) False: the arena has left the world
-    alive: BoolArray  # (rows,)
-    pose: FloatArray  # (rows, 3) x, y in m, heading in rad, arena frame
-    velocity: FloatArray  # (rows, 3) m/s, m/s, rad/s, arena frame
-    command: FloatArray  # (rows, 3) limited by the drive: m/s ahead, rad/s to the left, m/s to the left
-    state: IntArray  # (rows,) index in `states` of the last state that the agent noted; 0: none
-    states: tuple[str, ...]  # all states noted so far, in order; the first is empty
-    leds: IntArray  # (rows, max LEDs of a robot) 0xRRGGBB after this tick's commands; 0: dark, or no LED
-    readings: Readings  # readings at the start of the tick of the robots that act in it
-    contact_onsets: IntArray  # (arenas, 2) contacts that began in this tick: between robots, with walls or obstacles
-    edges: IntArray | None  # (e, 2) robot rows joined in the radio graph at the tick's start; None without a radio
-    tally: PacketCounts | None  # None without a radio
-    finished: ReceptionRecords | None  # None without a radio
-    events: tuple[EventRecord, ...] = ()  # at the tick's start, in order
-    departed: TransmissionRecords | None = None  # None without a radio, and for live observers
-    movable: FloatArray | None = None  # (arenas, movable obstacles, 3) x, y, heading; None: no movable obstacles
+    running: BoolArray  #: (arenas,) False: the arena has left the world
+    alive: BoolArray  #: (rows,)
+    pose: FloatArray  #: (rows, 3) x, y in m, heading in rad, arena frame
+    velocity: FloatArray  #: (rows, 3) m/s, m/s, rad/s, arena frame
+    command: FloatArray  #: (rows, 3) limited by the drive: m/s ahead, rad/s to the left, m/s to the left
+    state: IntArray  #: (rows,) index in `states` of the last state that the agent noted; 0: none
+    states: tuple[str, ...]  #: all states noted so far, in order; the first is empty
+    leds: IntArray  #: (rows, max LEDs of a robot) 0xRRGGBB after this tick's commands; 0: dark, or no LED
+    readings: Readings  #: readings at the start of the tick of the robots that act in it
+    contact_onsets: IntArray  #: (arenas, 2) contacts that began in this tick: between robots, with walls or obstacles
+    edges: IntArray | None  #: (e, 2) robot rows joined in the radio graph at the tick's start; None without a radio
+    tally: PacketCounts | None  #: None without a radio
+    finished: ReceptionRecords | None  #: None without a radio
+    events: tuple[EventRecord, ...] = ()  #: at the tick's start, in order
+    departed: TransmissionRecords | None = None  #: None without a radio, and for live observers
+    movable: FloatArray | None = None  #: (arenas, movable obstacles, 3) x, y, heading; None: no movable obstacles
     # (rows,) last noted value, NaN: none; None: no agent has noted a value yet, and for live observers
     value: FloatArray | None = None

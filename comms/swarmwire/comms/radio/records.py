@@ -25,20 +25,20 @@ class ReceptionRecords:
     Receivers out of range appear in `PacketCounts` only.
     """
 
-    arena: IntArray  # (k,)
-    sender: IntArray  # (k,) index in the arena
-    receiver: IntArray  # (k,) index in the arena; NO_ROBOT: all intended receivers
-    receivers: IntArray  # (k,) number of intended receivers in this row: 1, or all of them
-    to: IntArray  # (k,) index in the arena of the addressed robot, or BROADCAST
-    sequence: IntArray  # (k,)
-    sent_at_ns: IntArray  # (k,)
-    on_air_at_ns: IntArray  # (k,)
-    final_at_ns: IntArray  # (k,) time at which the fate became final, see `RadioMedium`
-    fate: IntArray  # (k,) a Fate
-    size_bytes: IntArray  # (k,) payload with its tag
-    tag: IntArray  # (k,) tag of the message's class
-    rssi_dbm: FloatArray | None = None  # (k,) power at the receiver; None: the radio model has none
-    payload: IntArray | None = None  # (k,) row of `payloads`; None: not recorded
+    arena: IntArray  #: (k,)
+    sender: IntArray  #: (k,) index in the arena
+    receiver: IntArray  #: (k,) index in the arena; NO_ROBOT: all intended receivers
+    receivers: IntArray  #: (k,) number of intended receivers in this row: 1, or all of them
+    to: IntArray  #: (k,) index in the arena of the addressed robot, or BROADCAST
+    sequence: IntArray  #: (k,)
+    sent_at_ns: IntArray  #: (k,)
+    on_air_at_ns: IntArray  #: (k,)
+    final_at_ns: IntArray  #: (k,) time at which the fate became final, see `RadioMedium`
+    fate: IntArray  #: (k,) a Fate
+    size_bytes: IntArray  #: (k,) payload with its tag
+    tag: IntArray  #: (k,) tag of the message's class
+    rssi_dbm: FloatArray | None = None  #: (k,) power at the receiver; None: the radio model has none
+    payload: IntArray | None = None  #: (k,) row of `payloads`; None: not recorded
     payloads: Payloads | None = None
 
     def in_arenas(self, arenas: BoolArray) -> "ReceptionRecords":
@@ -69,15 +69,15 @@ class TransmissionRecords:
     The times of a packet that was retransmitted are those of one attempt.
     """
 
-    arena: IntArray  # (k,)
-    sender: IntArray  # (k,) index in the arena
-    to: IntArray  # (k,) index in the arena of the addressed robot, or BROADCAST
-    sequence: IntArray  # (k,)
-    intended: IntArray  # (k,) number of intended receivers
-    out_of_range: IntArray  # (k,) number of these that were out of range; 0 if the packet was never on air
-    fate: IntArray  # (k,) ON_AIR, or the Fate of a packet that never went on air
-    on_air_at_ns: IntArray  # (k,)
-    off_air_at_ns: IntArray  # (k,) equal to on_air_at_ns if the packet was never on air
+    arena: IntArray  #: (k,)
+    sender: IntArray  #: (k,) index in the arena
+    to: IntArray  #: (k,) index in the arena of the addressed robot, or BROADCAST
+    sequence: IntArray  #: (k,)
+    intended: IntArray  #: (k,) number of intended receivers
+    out_of_range: IntArray  #: (k,) number of these that were out of range; 0 if the packet was never on air
+    fate: IntArray  #: (k,) ON_AIR, or the Fate of a packet that never went on air
+    on_air_at_ns: IntArray  #: (k,)
+    off_air_at_ns: IntArray  #: (k,) equal to on_air_at_ns if the packet was never on air
 
     def in_arenas(self, arenas: BoolArray) -> "TransmissionRecords":
         """Return the packets of the selected arenas (arenas,)."""
@@ -105,10 +105,10 @@ def _joined_columns(tables: Sequence[ReceptionRecords] | Sequence[TransmissionRe
 class PacketCounts:
     """Packets counted since the last tick, a row per arena; over a run the fates add up to the intended receivers."""
 
-    sent: IntArray  # (arenas,) packets handed to the radio
-    intended: IntArray  # (arenas,) intended receivers of these packets
-    in_range: IntArray  # (arenas,) receivers in range, see `Fate`, of the fates that became final
-    fates: IntArray  # (arenas, fates) fates that became final
+    sent: IntArray  #: (arenas,) packets handed to the radio
+    intended: IntArray  #: (arenas,) intended receivers of these packets
+    in_range: IntArray  #: (arenas,) receivers in range, see `Fate`, of the fates that became final
+    fates: IntArray  #: (arenas, fates) fates that became final
 
     def __add__(self, other: "PacketCounts") -> "PacketCounts":
         """Return the sums of both."""

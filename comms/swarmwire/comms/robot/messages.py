@@ -70,10 +70,10 @@ class Message:
 
     tag: ClassVar[int] = NO_TAG
     size_bytes: ClassVar[int] = TAG_BYTES
-    on_air: ClassVar[np.dtype[Any]] = np.dtype([("tag", "<u2")])  # tag and fields, packed
-    ranges: ClassVar[dict[str, FieldRange]] = {}  # range of each field, by name
-    byte_index: ClassVar[IntArray] = np.arange(TAG_BYTES)  # (size_bytes,) 0, 1, 2, …
-    packing: ClassVar[struct.Struct] = struct.Struct("<H")  # the layout of `on_air`, to pack a single message
+    on_air: ClassVar[np.dtype[Any]] = np.dtype([("tag", "<u2")])  #: tag and fields, packed
+    ranges: ClassVar[dict[str, FieldRange]] = {}  #: range of each field, by name
+    byte_index: ClassVar[IntArray] = np.arange(TAG_BYTES)  #: (size_bytes,) 0, 1, 2, …
+    packing: ClassVar[struct.Struct] = struct.Struct("<H")  #: the layout of `on_air`, to pack a single message
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()

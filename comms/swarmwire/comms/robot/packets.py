@@ -50,8 +50,8 @@ FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # names in summaries and
 class Payloads:
     """A table of encoded messages: row p is data[offset[p]:offset[p + 1]] and starts with the message's tag."""
 
-    data: ByteArray  # (bytes,)
-    offset: IntArray  # (rows + 1,), starts at 0, never falls
+    data: ByteArray  #: (bytes,)
+    offset: IntArray  #: (rows + 1,), starts at 0, never falls
 
     def __len__(self) -> int:
         return len(self.offset) - 1
@@ -246,9 +246,9 @@ class TxResult(ExplainedEnum):
 class TxStatuses:
     """Unicast packets whose transmission ended at the sender's radio, sorted by (row, id)."""
 
-    row: IntArray  # (k,) sender: for a VectorAgent 0 to n - 1, between backend and medium arena x robots + index
-    id: IntArray  # (k,) as `send` returned it
-    result: IntArray  # (k,) TxResult
+    row: IntArray  #: (k,) sender: for a VectorAgent 0 to n - 1, between backend and medium arena x robots + index
+    id: IntArray  #: (k,) as `send` returned it
+    result: IntArray  #: (k,) TxResult
 
     def __len__(self) -> int:
         return len(self.row)

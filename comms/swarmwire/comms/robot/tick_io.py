@@ -79,8 +79,8 @@ class GroupReadings:
     `ages_ticks` is the time from a sensor's measurement to this tick; it stays in the world.
     """
 
-    rows: IntArray  # (n,) robot row: arena x robots + index, rising
-    fields: dict[str, FloatArray]  # "sensor.field" -> (n,) or (n, width), C-contiguous
+    rows: IntArray  #: (n,) robot row: arena x robots + index, rising
+    fields: dict[str, FloatArray]  #: "sensor.field" -> (n,) or (n, width), C-contiguous
     # Ages above 0, by sensor; None: the sensor has not measured yet.
     ages_ticks: dict[str, int | None] = field(default_factory=dict[str, int | None])
 

@@ -119,9 +119,9 @@ class Sweep:
     """Progress of a campaign."""
 
     folder: Path
-    runs: int  # runs of the campaign
-    done: int  # runs that have a row
-    failed: int  # failed runs among them
+    runs: int  #: runs of the campaign
+    done: int  #: runs that have a row
+    failed: int  #: failed runs among them
 
     @property
     def is_over(self) -> bool:

@@ -58,7 +58,9 @@ class TaskResult:
     """A row for each run of a task, in their order, failed runs included."""
 
     rows: tuple[Row, ...]
-    series: bytes | None = None  # a Parquet file: run, tick, and a column per metric; None: not recorded, or all failed
+    series: bytes | None = (
+        None  #: a Parquet file: run, tick, and a column per metric; None: not recorded, or all failed
+    )
 
 
 def run_task(task: Task, worker: str = "", alive: Callable[[], bool] = lambda: True) -> TaskResult:

@@ -21,19 +21,19 @@ class ArenaState:
     Arrays have a row per arena; robots are in the scenario's order. Arenas that wait for a reset have 0 everywhere.
     """
 
-    time_s: FloatArray  # (arenas,) time since the start of the episode
-    pose: FloatArray  # (arenas, robots, 3) x, y in m, heading in rad, arena frame
-    pose_before: FloatArray  # (arenas, robots, 3) pose at the start of the last tick
-    velocity: FloatArray  # (arenas, robots, 3) m/s, m/s, rad/s, arena frame
-    command: FloatArray  # (arenas, robots, 3) clipped command of the last tick: forward, turn, to the left
-    alive: BoolArray  # (arenas, robots)
-    contacts: IntArray  # (arenas, 2) new contacts of robots in the step: with robots, with walls or obstacles
-    action: Float32Array  # (arenas, robots, numbers) action of the policy
-    metrics: dict[str, FloatArray]  # (arenas,) each; a level at the start of the last tick, a count over the step
-    light_m: FloatArray  # (arenas, lights, 2) positions of lights; NaN beyond the last of an arena
-    lights: tuple[tuple[Light, ...], ...]  # lights of each arena
-    obstacles: tuple[tuple[Obstacle, ...], ...]  # obstacles of each arena at the start
-    values: tuple[dict[str, object], ...]  # random values of each episode, by path in the scenario
+    time_s: FloatArray  #: (arenas,) time since the start of the episode
+    pose: FloatArray  #: (arenas, robots, 3) x, y in m, heading in rad, arena frame
+    pose_before: FloatArray  #: (arenas, robots, 3) pose at the start of the last tick
+    velocity: FloatArray  #: (arenas, robots, 3) m/s, m/s, rad/s, arena frame
+    command: FloatArray  #: (arenas, robots, 3) clipped command of the last tick: forward, turn, to the left
+    alive: BoolArray  #: (arenas, robots)
+    contacts: IntArray  #: (arenas, 2) new contacts of robots in the step: with robots, with walls or obstacles
+    action: Float32Array  #: (arenas, robots, numbers) action of the policy
+    metrics: dict[str, FloatArray]  #: (arenas,) each; a level at the start of the last tick, a count over the step
+    light_m: FloatArray  #: (arenas, lights, 2) positions of lights; NaN beyond the last of an arena
+    lights: tuple[tuple[Light, ...], ...]  #: lights of each arena
+    obstacles: tuple[tuple[Obstacle, ...], ...]  #: obstacles of each arena at the start
+    values: tuple[dict[str, object], ...]  #: random values of each episode, by path in the scenario
 
 
 RewardFunction = Callable[[ArenaState], FloatArray]
@@ -86,22 +86,22 @@ def drawn(randomise: Mapping[str, Distribution], seed: int) -> dict[str, object]
 class EnvOptions:
     """The options of `parallel_env` and `vector_env`."""
 
-    seed: int | None = None  # seed of the first episode without `reset(seed=…)`; None: the scenario's
-    overrides: Sequence[str] = ()  # overrides of the scenario: "path=value"
+    seed: int | None = None  #: seed of the first episode without `reset(seed=…)`; None: the scenario's
+    overrides: Sequence[str] = ()  #: overrides of the scenario: "path=value"
     randomise: Mapping[str, Distribution] = field(
         default_factory=dict[str, Distribution]
-    )  # distributions by path in the scenario
-    reward: RewardFunction | Mapping[str, float] | str | None = None  # a function, weights of metrics, or a metric
-    terminated: TerminationFunction | Condition | None = None  # added to the scenario's stop conditions
-    groups: Sequence[str] | None = None  # groups that the policy controls, others run their agents; None: all
-    sensors: Sequence[str] | None = None  # None: the sensors of the scenario's agent
-    neighbours: int = 4  # number of senders in an observation
-    order: Literal["nearest", "newest"] | None = None  # None: nearest if the radio measures ranges
-    message: int = 2  # numbers that the policy sends in each step
-    shared: Sequence[str] | None = None  # sensors whose readings are part of messages; None: the compass
-    speed_mps: float | None = None  # speed at action 1; None: the body's limit
+    )  #: distributions by path in the scenario
+    reward: RewardFunction | Mapping[str, float] | str | None = None  #: a function, weights of metrics, or a metric
+    terminated: TerminationFunction | Condition | None = None  #: added to the scenario's stop conditions
+    groups: Sequence[str] | None = None  #: groups that the policy controls, others run their agents; None: all
+    sensors: Sequence[str] | None = None  #: None: the sensors of the scenario's agent
+    neighbours: int = 4  #: number of senders in an observation
+    order: Literal["nearest", "newest"] | None = None  #: None: nearest if the radio measures ranges
+    message: int = 2  #: numbers that the policy sends in each step
+    shared: Sequence[str] | None = None  #: sensors whose readings are part of messages; None: the compass
+    speed_mps: float | None = None  #: speed at action 1; None: the body's limit
     turn_radps: float | None = None
-    hashes: bool = True  # compute trajectory hashes, a tenth of the time of a step
+    hashes: bool = True  #: compute trajectory hashes, a tenth of the time of a step
 
     def __post_init__(self) -> None:
         for path, distribution in self.randomise.items():

@@ -39,11 +39,11 @@ SeedsOption = str | int | Sequence[int]  # number of seeds from 1 on; a number, 
 class Recording:
     """The records of a run. A run can be repeated (`swarmwire repeat`) with more records than the first time."""
 
-    packets: float = 0.0  # share of the packets in `packets.parquet`, drawn by key; 1: all
-    links: bool = False  # `radio_links.parquet`
-    tables: bool = True  # `ticks.parquet`, `events.parquet`, `radio_robots.parquet`, `radio_distances.parquet`
-    rrd: bool = True  # `run.rrd`, for rerun's viewer
-    select: str | None = None  # robot that views show in detail; None: the first that has rays or photocells
+    packets: float = 0.0  #: share of the packets in `packets.parquet`, drawn by key; 1: all
+    links: bool = False  #: `radio_links.parquet`
+    tables: bool = True  #: `ticks.parquet`, `events.parquet`, `radio_robots.parquet`, `radio_distances.parquet`
+    rrd: bool = True  #: `run.rrd`, for rerun's viewer
+    select: str | None = None  #: robot that views show in detail; None: the first that has rays or photocells
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.packets <= 1.0:
@@ -78,11 +78,11 @@ class JoinObserver:
 class Listening:
     """The endpoints of a run with remote agents, and the terms on which runners join."""
 
-    endpoints: tuple[str, ...]  # endpoints for runners, such as "tls/0.0.0.0:7447"
-    observed: tuple[str, ...] = ()  # endpoints for remote observers and operators
-    network: Network = field(default_factory=Network)  # certificates of the run
-    access: RunAccess | None = None  # names with permissions; None: each program that reaches an endpoint may join
-    start_with: int | None = None  # number of robots with an agent at which the first tick begins; None: all
+    endpoints: tuple[str, ...]  #: endpoints for runners, such as "tls/0.0.0.0:7447"
+    observed: tuple[str, ...] = ()  #: endpoints for remote observers and operators
+    network: Network = field(default_factory=Network)  #: certificates of the run
+    access: RunAccess | None = None  #: names with permissions; None: each program that reaches an endpoint may join
+    start_with: int | None = None  #: number of robots with an agent at which the first tick begins; None: all
     limits: JoinLimits = LIMITS
     observer: JoinObserver = field(default_factory=JoinObserver)
 
@@ -115,10 +115,10 @@ class Listening:
 class Replay:
     """The parts of a run's record that determine its repetition."""
 
-    ticks: int  # instead of the scenario's
-    inputs: RecordedInputs | None  # None: all actions follow from scenario and seed
+    ticks: int  #: instead of the scenario's
+    inputs: RecordedInputs | None  #: None: all actions follow from scenario and seed
     live_events: tuple[LiveEvent, ...] = ()
-    subtick_s: float | None = None  # interval at which packets crossed between ticks; None: at the starts of ticks
+    subtick_s: float | None = None  #: interval at which packets crossed between ticks; None: at the starts of ticks
 
 
 @dataclass(frozen=True)
@@ -127,21 +127,21 @@ class RunConfig:
 
     scenario: Scenario | Path | str
     _: KW_ONLY
-    seed: int | None = None  # seed of the only arena; None: the scenario's
-    seeds: SeedsOption | None = None  # one arena per seed, side by side: a number (9: 1 to 9), a list, or "4:10"
-    threads: int = 1  # threads of this process for one tick; they change nothing but the speed
-    runners: Runners = None  # None: all agents in this process; a number of runner processes; or "per-robot"
-    agent_network: bool = False  # True: agents in processes of their own may use this machine's network
-    isolate: bool = False  # True: these processes are isolated, for code that is not trusted
-    overrides: Sequence[str] = ()  # values of the scenario, "path=value", like `--set`
-    out: Path | str | None = None  # run folder, new or empty; None: nothing is written
-    observers: Sequence[Observer] = ()  # an observer that raises is reported, counted and left out
-    realtime: float | str | None = None  # simulated s per s of wall time; None: as fast as the machine allows
-    subtick: float | None = None  # wall time in s after which packets cross also between ticks, in real time
-    record: Recording | None = None  # records in the run folder; None: `Recording()`
-    gateways: GatewayOption = None  # robots that answer as real ones: "epuck2", {"flock": "ros2"}, or `Gateways`
-    listening: Listening | None = None  # endpoints for runners that others start, here or elsewhere
-    replay: Replay | None = None  # record of the run that is repeated
+    seed: int | None = None  #: seed of the only arena; None: the scenario's
+    seeds: SeedsOption | None = None  #: one arena per seed, side by side: a number (9: 1 to 9), a list, or "4:10"
+    threads: int = 1  #: threads of this process for one tick; they change nothing but the speed
+    runners: Runners = None  #: None: all agents in this process; a number of runner processes; or "per-robot"
+    agent_network: bool = False  #: True: agents in processes of their own may use this machine's network
+    isolate: bool = False  #: True: these processes are isolated, for code that is not trusted
+    overrides: Sequence[str] = ()  #: values of the scenario, "path=value", like `--set`
+    out: Path | str | None = None  #: run folder, new or empty; None: nothing is written
+    observers: Sequence[Observer] = ()  #: an observer that raises is reported, counted and left out
+    realtime: float | str | None = None  #: simulated s per s of wall time; None: as fast as the machine allows
+    subtick: float | None = None  #: wall time in s after which packets cross also between ticks, in real time
+    record: Recording | None = None  #: records in the run folder; None: `Recording()`
+    gateways: GatewayOption = None  #: robots that answer as real ones: "epuck2", {"flock": "ros2"}, or `Gateways`
+    listening: Listening | None = None  #: endpoints for runners that others start, here or elsewhere
+    replay: Replay | None = None  #: record of the run that is repeated
 
 
 class RunOptions(TypedDict, total=False):

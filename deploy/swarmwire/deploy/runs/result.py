@@ -48,14 +48,14 @@ class Percentiles:
 class RadioResult:
     """The fates of all packets of one arena."""
 
-    sent: int  # number of packets
-    intended: int  # number of intended receivers, of all packets
-    in_range: int  # number of intended receivers in range
-    fates: dict[str, int]  # number of intended receivers by fate; the sum is `intended`
-    pdr: float | None  # packet delivery ratio: received / intended; None without intended receivers
-    link_pdr: float | None  # PDR of links: received / in_range; None if no receiver was in range
-    latency_air_s: Percentiles  # time from sending to reception
-    latency_agent_s: Percentiles  # time from sending to the tick at which the receiver can act
+    sent: int  #: number of packets
+    intended: int  #: number of intended receivers, of all packets
+    in_range: int  #: number of intended receivers in range
+    fates: dict[str, int]  #: number of intended receivers by fate; the sum is `intended`
+    pdr: float | None  #: packet delivery ratio: received / intended; None without intended receivers
+    link_pdr: float | None  #: PDR of links: received / in_range; None if no receiver was in range
+    latency_air_s: Percentiles  #: time from sending to reception
+    latency_agent_s: Percentiles  #: time from sending to the tick at which the receiver can act
 
 
 @dataclass(frozen=True)
@@ -63,15 +63,15 @@ class ArenaResult:
     """The results of one arena."""
 
     seed: int
-    ended: str  # "stopped" if it ended before the run; else as in `Result.ended`
-    ticks: int  # number of its ticks
+    ended: str  #: "stopped" if it ended before the run; else as in `Result.ended`
+    ticks: int  #: number of its ticks
     sim_time_s: float
     trajectory_sha256: str
-    counts: dict[str, int]  # its part of the run's counts, by name, without zeros
+    counts: dict[str, int]  #: its part of the run's counts, by name, without zeros
     radio: RadioResult | None
     metrics: dict[str, Statistics]
-    stop_time_s: float | None  # start of the time for which its stop condition held; None: censored at sim_time_s
-    stopped_by: str | None  # its stop condition in words: "order at least 0.9 for 5 s"
+    stop_time_s: float | None  #: start of the time for which its stop condition held; None: censored at sim_time_s
+    stopped_by: str | None  #: its stop condition in words: "order at least 0.9 for 5 s"
 
     def end(self) -> dict[str, Any]:
         """Return the fields about its end, as in the summary."""
@@ -83,13 +83,13 @@ class ArenaResult:
 class EventResult:
     """An event that took effect, or ended after its time."""
 
-    at_s: float  # time in the scenario; for an event of single robots the tick's start
+    at_s: float  #: time in the scenario; for an event of single robots the tick's start
     tick: int
     do: str
-    part: str  # the part that fails; "" for other actions
+    part: str  #: the part that fails; "" for other actions
     ended: bool
-    singly: bool  # True if each robot has a time of its own: batteries that run down, failures at a rate
-    robots: list[list[str]]  # names of the changed robots, per arena
+    singly: bool  #: True if each robot has a time of its own: batteries that run down, failures at a rate
+    robots: list[list[str]]  #: names of the changed robots, per arena
 
 
 @dataclass(frozen=True)
@@ -97,30 +97,30 @@ class Result:
     """The result of one run, with the content of `summary.json`."""
 
     scenario: str
-    robots: int  # number in each arena
-    engine: str  # engine of the bodies: "discs", "pymunk", "kinematic", or two of them joined by " and "
-    runners: int  # 0: all agents in the world's process
-    mode: str  # "local" | "lockstep" | "realtime"
-    ended: str  # "duration" | "stopped" (all arenas) | "interrupted" | "left" (by the caller that steps it) | "failed"
-    error: str | None  # message of a failed run
-    ticks: int  # number of ticks of the longest arena
+    robots: int  #: number in each arena
+    engine: str  #: engine of the bodies: "discs", "pymunk", "kinematic", or two of them joined by " and "
+    runners: int  #: 0: all agents in the world's process
+    mode: str  #: "local" | "lockstep" | "realtime"
+    ended: str  #: "duration" | "stopped" (all arenas) | "interrupted" | "left" (by the caller that steps it) | "failed"
+    error: str | None  #: message of a failed run
+    ticks: int  #: number of ticks of the longest arena
     sim_time_s: float
-    wall_time_s: float  # wall time of the loop
-    start_time_s: float  # wall time from the call to the first tick
-    stop: tuple[str, ...]  # stop conditions in words: "order at least 0.9 for 5 s"
+    wall_time_s: float  #: wall time of the loop
+    start_time_s: float  #: wall time from the call to the first tick
+    stop: tuple[str, ...]  #: stop conditions in words: "order at least 0.9 for 5 s"
     arenas: tuple[ArenaResult, ...]
     events: tuple[EventResult, ...]
-    global_sensors: dict[str, list[str]]  # sensors that measure beyond the robot's surroundings, by body
-    counts: dict[str, int]  # faults, by name: late, missing, malformed, clipped
-    lost_runners: tuple[str, ...]  # losses that the run survived: name, robots and reason
-    runner_events: tuple[RunnerEvent, ...]  # runners that joined, left, were lost and returned, in order
+    global_sensors: dict[str, list[str]]  #: sensors that measure beyond the robot's surroundings, by body
+    counts: dict[str, int]  #: faults, by name: late, missing, malformed, clipped
+    lost_runners: tuple[str, ...]  #: losses that the run survived: name, robots and reason
+    runner_events: tuple[RunnerEvent, ...]  #: runners that joined, left, were lost and returned, in order
     realtime: RealTimeReport | None
-    interfaces: InterfacesReport | None  # report on the robots' network interfaces
+    interfaces: InterfacesReport | None  #: report on the robots' network interfaces
     facts: RunFacts
-    inputs: InputsRecord | None  # recorded external actions
-    live_events: LiveEventsRecord | None  # recorded live events
-    record: dict[str, dict[str, Any]] = field(compare=False)  # tables
-    out: Path | None = field(compare=False)  # the run folder
+    inputs: InputsRecord | None  #: recorded external actions
+    live_events: LiveEventsRecord | None  #: recorded live events
+    record: dict[str, dict[str, Any]] = field(compare=False)  #: tables
+    out: Path | None = field(compare=False)  #: the run folder
 
     @property
     def realtime_factor(self) -> float:

@@ -147,11 +147,11 @@ def _accumulate(value: AnyArray, latest: AnyArray, running: AnyArray, is_count: 
 class Condition:
     """A metric's value in an arena, compared with a number."""
 
-    metric: str  # name of a metric: a level's value in the tick, a count's total so far, or a time
+    metric: str  #: name of a metric: a level's value in the tick, a count's total so far, or a time
     comparison: Comparison
     limit: float
-    hold_s: float = 0.0  # time for which the comparison must be true in every tick
-    keep_running: bool = False  # record the time only; the arena continues
+    hold_s: float = 0.0  #: time for which the comparison must be true in every tick
+    keep_running: bool = False  #: record the time only; the arena continues
 
     def __str__(self) -> str:
         """Return the condition in words: "order at least 0.9 for 5 s"."""

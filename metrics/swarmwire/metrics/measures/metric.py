@@ -27,32 +27,29 @@ Need = Literal["poses", "contacts", "graph", "airtime", "latency"]  # latency: o
 class Components(NamedTuple):
     """The components of a graph that hold a robot alive; none spans two arenas, since no edge does."""
 
-    number: IntArray  # (arenas,) number of components
-    largest: IntArray  # (arenas,) robots alive in the largest component; 0 without a component
+    number: IntArray  #: (arenas,) number of components
+    largest: IntArray  #: (arenas,) robots alive in the largest component; 0 without a component
 
 
 class TickView:
-    """The truth of one tick with its rows folded to (arenas, robots).
+    """The truth of one tick with its rows folded to (arenas, robots)."""
 
-    Attributes:
-        static: constants of the run.
-        truth: the tick's ground truth.
-        pose: (arenas, robots, 3) x, y in m, heading in rad, arena frame, dead robots included.
-        velocity: (arenas, robots, 3) m/s, m/s, rad/s, arena frame, dead robots included.
-        alive: (arenas, robots) True if alive.
-        robots_alive: (arenas,) number of robots alive.
-        components: components of the radio graph; None without a radio.
-        per_robot_alive: (arenas,) divisor of a mean over the robots alive: their number; NaN if there is none.
-    """
+    static: Static  #: constants of the run
+    truth: Truth  #: the tick's ground truth
+    pose: FloatArray  #: (arenas, robots, 3) x, y in m, heading in rad, arena frame, dead robots included
+    velocity: FloatArray  #: (arenas, robots, 3) m/s, m/s, rad/s, arena frame, dead robots included
+    alive: BoolArray  #: (arenas, robots) True if alive
+    robots_alive: IntArray  #: (arenas,) number of robots alive
+    #: (arenas,) divisor of a mean over the robots alive: their number; NaN if there is none
+    per_robot_alive: FloatArray
+    components: Components | None  #: components of the radio graph; None without a radio
 
     def __init__(self, static: Static, truth: Truth) -> None:
         self.static, self.truth = static, truth
         arenas, robots = static.arenas, static.robots
-        self.pose: FloatArray = truth.pose.reshape(arenas, robots, 3)
-        self.velocity: FloatArray = truth.velocity.reshape(arenas, robots, 3)
-        self.alive: BoolArray = truth.alive.reshape(arenas, robots)
-        self.robots_alive: IntArray
-        self.per_robot_alive: FloatArray
+        self.pose = truth.pose.reshape(arenas, robots, 3)
+        self.velocity = truth.velocity.reshape(arenas, robots, 3)
+        self.alive = truth.alive.reshape(arenas, robots)
         self.robots_alive, self.per_robot_alive, all_alive = _count(self.alive)
         edges = truth.edges
         self.components = None if edges is None else components_of(edges, self.alive)
@@ -110,13 +107,13 @@ class Metric(ABC):
     function that `begin` returns holds the memory from tick to tick, so one metric serves many runs.
     """
 
-    name: ClassVar[str]  # name for scenarios, summaries and plots
-    help: ClassVar[str]  # one line: formula and unit
+    name: ClassVar[str]  #: name for scenarios, summaries and plots
+    help: ClassVar[str]  #: one line: formula and unit
     unit: ClassVar[str] = ""
     kind: ClassVar[Kind] = "level"
-    standard: ClassVar[bool] = False  # measured in every run; other metrics only if a scenario lists them
-    needs: ClassVar[tuple[Need, ...]] = ("poses",)  # data without which logs of real robots have no value
-    bounds: ClassVar[tuple[float | None, float | None]]  # least and largest value of a tick; None: unbounded
+    standard: ClassVar[bool] = False  #: measured in every run; other metrics only if a scenario lists them
+    needs: ClassVar[tuple[Need, ...]] = ("poses",)  #: data without which logs of real robots have no value
+    bounds: ClassVar[tuple[float | None, float | None]]  #: least and largest value of a tick; None: unbounded
 
     @abstractmethod
     def begin(self, static: Static) -> Measure:

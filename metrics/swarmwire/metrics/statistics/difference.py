@@ -95,17 +95,17 @@ def _shares(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, Float
 class Difference:
     """Second minus first; NaN: unknown."""
 
-    pairs: int  # seeds that were compared one by one; 0: no pairs
-    median: float  # median of the differences for numbers in pairs, else difference of the medians
-    median_interval: Interval  # bootstrap; open if resampled medians of times lie beyond the observed times
-    mean: float  # difference of the means; for times, of min(time, horizon)
-    mean_interval: Interval  # bootstrap
-    is_skewed: bool  # True if the differences, or a sample, are skewed: the interval of the mean may cover too little
-    horizon: float  # time up to which every run was observed; inf for numbers
-    is_discrete: bool  # True for numbers of few distinct values: medians hardly differ, the mean is more informative
-    delta: float  # Cliff's, -1 to 1: P(second > first) - P(second < first), over all values
-    g: float  # Hedges'; NaN for times
-    p: float  # two-sided; NaN: not defined
+    pairs: int  #: seeds that were compared one by one; 0: no pairs
+    median: float  #: median of the differences for numbers in pairs, else difference of the medians
+    median_interval: Interval  #: bootstrap; open if resampled medians of times lie beyond the observed times
+    mean: float  #: difference of the means; for times, of min(time, horizon)
+    mean_interval: Interval  #: bootstrap
+    is_skewed: bool  #: True if the differences, or a sample, are skewed: the interval of the mean may cover too little
+    horizon: float  #: time up to which every run was observed; inf for numbers
+    is_discrete: bool  #: True for numbers of few distinct values: medians hardly differ, the mean is more informative
+    delta: float  #: Cliff's, -1 to 1: P(second > first) - P(second < first), over all values
+    g: float  #: Hedges'; NaN for times
+    p: float  #: two-sided; NaN: not defined
     test: Test
 
 

@@ -17,12 +17,12 @@ LEVEL = 0.95  # default confidence
 class Sample:
     """n values, in the order of their seeds, and counts of the runs without a value."""
 
-    value: FloatArray  # (n,) finite; if not observed, the censoring time
-    observed: BoolArray  # (n,) False: right-censored, the true value lies beyond
-    seed: IntArray  # (n,) seed of each value's run; runs of one seed start alike
-    kind: Kind = "number"  # quantiles of times are Kaplan and Meier's, censored or not
-    failed: int = 0  # runs that ended in an error
-    undefined: int = 0  # runs without an error and without a value
+    value: FloatArray  #: (n,) finite; if not observed, the censoring time
+    observed: BoolArray  #: (n,) False: right-censored, the true value lies beyond
+    seed: IntArray  #: (n,) seed of each value's run; runs of one seed start alike
+    kind: Kind = "number"  #: quantiles of times are Kaplan and Meier's, censored or not
+    failed: int = 0  #: runs that ended in an error
+    undefined: int = 0  #: runs without an error and without a value
     # (k,) Censoring times of the runs that a stop condition ended before the time. If the condition depends on the
     # event, their censoring is informative, and estimates mislead.
     stopped_first: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -63,8 +63,8 @@ def time_sample(value: FloatArray, observed: BoolArray, seed: IntArray | None = 
 class SeedTable(NamedTuple):
     """Values of points, a row per point and a column per seed; more columns if a row combines several points."""
 
-    value: FloatArray  # (points, columns); NaN without such a run
-    seed: IntArray  # (columns,)
+    value: FloatArray  #: (points, columns); NaN without such a run
+    seed: IntArray  #: (columns,)
 
     @classmethod
     def from_table(cls, table: "FloatArray | SeedTable") -> "SeedTable":

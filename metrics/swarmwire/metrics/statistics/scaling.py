@@ -20,11 +20,11 @@ class Scaling:
     (Comm. ACM 33, 1990), which Harwell and Gini apply to swarms (arXiv 1907.03880).
     """
 
-    robots: FloatArray  # (sizes,) N
-    reference: float  # N0
-    speed_up: FloatArray  # X = P(N) / P(N0), or T(N0) / T(N)
-    efficiency: FloatArray  # E = X N0 / N: 1 if each robot does as much as a robot of the smallest swarm
-    serial_fraction: FloatArray  # e = (1/X - 1/s) / (1 - 1/s), s = N / N0: 0 if E is 1, 1 if more robots gain nothing
+    robots: FloatArray  #: (sizes,) N
+    reference: float  #: N0
+    speed_up: FloatArray  #: X = P(N) / P(N0), or T(N0) / T(N)
+    efficiency: FloatArray  #: E = X N0 / N: 1 if each robot does as much as a robot of the smallest swarm
+    serial_fraction: FloatArray  #: e = (1/X - 1/s) / (1 - 1/s), s = N / N0: 0 if E is 1, 1 if more robots gain nothing
 
 
 def scaling(robots: FloatArray, response: FloatArray, *, is_time: bool) -> Scaling:
@@ -49,10 +49,10 @@ def scaling(robots: FloatArray, response: FloatArray, *, is_time: bool) -> Scali
 class ScaledTimes:
     """Scaling of mean times, restricted to a time that all sizes share."""
 
-    mean: FloatArray  # (sizes,) mean of min(time, horizon), by Kaplan and Meier's estimate
-    horizon: float  # time up to which every run of every size was observed
+    mean: FloatArray  #: (sizes,) mean of min(time, horizon), by Kaplan and Meier's estimate
+    horizon: float  #: time up to which every run of every size was observed
     scaling: Scaling
-    intervals: dict[str, list[Interval]]  # speed_up, efficiency, serial_fraction: bootstrap intervals for each size
+    intervals: dict[str, list[Interval]]  #: speed_up, efficiency, serial_fraction: bootstrap intervals for each size
 
 
 def scaling_of_times(robots: FloatArray, samples: Sequence[Sample], level: float = LEVEL) -> ScaledTimes:

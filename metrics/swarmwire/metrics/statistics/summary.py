@@ -28,21 +28,21 @@ class Summary:
     """Summary of n values; NaN without values, and for a quartile beyond the observed times."""
 
     n: int
-    seeds: int  # number of seeds; less than n if several runs have the same seed
-    failed: int  # runs that ended in an error
-    undefined: int  # runs without an error and without a value
-    censored: float  # share of the values, 0 to 1; 0 for numbers
-    stopped_first: int  # runs that a stop condition ended before the time
-    shortest: float  # shortest censoring time of these runs; NaN without them
+    seeds: int  #: number of seeds; less than n if several runs have the same seed
+    failed: int  #: runs that ended in an error
+    undefined: int  #: runs without an error and without a value
+    censored: float  #: share of the values, 0 to 1; 0 for numbers
+    stopped_first: int  #: runs that a stop condition ended before the time
+    shortest: float  #: shortest censoring time of these runs; NaN without them
     q25: float
     q50: float
     q75: float
-    mean: float  # mean of min(time, limit) for times
+    mean: float  #: mean of min(time, limit) for times
 
     q50_interval: Interval
     mean_interval: Interval
-    limit: float  # the largest value; a quartile of times that is NaN lies beyond it
-    is_skewed: bool  # True if the interval of the mean may cover too little
+    limit: float  #: the largest value; a quartile of times that is NaN lies beyond it
+    is_skewed: bool  #: True if the interval of the mean may cover too little
 
 
 def summary(sample: Sample, level: float = LEVEL) -> Summary:

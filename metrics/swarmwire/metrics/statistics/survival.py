@@ -26,11 +26,11 @@ class KaplanMeier:
     """The estimate at each time of an event or an end, (k,), sorted; before the first time, S is 1."""
 
     time: FloatArray
-    survival: FloatArray  # share of the runs without an event up to this time, inclusive
-    low: FloatArray  # lower edge of the pointwise confidence band
+    survival: FloatArray  #: share of the runs without an event up to this time, inclusive
+    low: FloatArray  #: lower edge of the pointwise confidence band
     high: FloatArray
-    variance: FloatArray  # Greenwood's sum over d / (n (n - d)) up to this time, inf once S is 0
-    level: float  # confidence level of the band
+    variance: FloatArray  #: Greenwood's sum over d / (n (n - d)) up to this time, inf once S is 0
+    level: float  #: confidence level of the band
 
     def quantile(self, share: float) -> float:
         """Return the first time by which this share of the runs had the event; NaN: beyond the observed times."""
@@ -141,8 +141,8 @@ def common_horizon(samples: Sequence[Sample]) -> float:
 class LogRank(NamedTuple):
     """The result of the test; NaN without an event while both samples had runs at risk."""
 
-    z: float  # standard normal under the null hypothesis; positive: earlier events in the first sample
-    p: float  # two-sided
+    z: float  #: standard normal under the null hypothesis; positive: earlier events in the first sample
+    p: float  #: two-sided
 
 
 def log_rank(first: Sample, second: Sample) -> LogRank:

@@ -36,12 +36,12 @@ class Fit:
     """Least squares over all runs; NaN, and AIC inf, if no curve of this form converged."""
 
     form: Form
-    a: float  # value without stress: near 1 for relative performance
-    b: float  # slope per unit of stress without stress, relative to a if exponential
+    a: float  #: value without stress: near 1 for relative performance
+    b: float  #: slope per unit of stress without stress, relative to a if exponential
     a_interval: Interval
     b_interval: Interval
-    r_squared: float  # explained share of the runs' variance; NaN without variance
-    aic: float  # n ln(RSS / n) + 2 * 3
+    r_squared: float  #: explained share of the runs' variance; NaN without variance
+    aic: float  #: n ln(RSS / n) + 2 * 3
 
     def evaluate(self, stress: FloatArray) -> FloatArray:
         """Return the curve at stresses of any shape."""
@@ -238,18 +238,18 @@ def _weighted(table: SeedTable, weight: FloatArray, row: int | slice = slice(Non
 class ChangePoint:
     """A step. Its position is halfway between the two points that it divides."""
 
-    after: float  # the last value of the parameter below it
-    before: float  # the first value above it
+    after: float  #: the last value of the parameter below it
+    before: float  #: the first value above it
     position: float
     position_interval: Interval
-    below: float  # mean of the response below
+    below: float  #: mean of the response below
     above: float
-    effect: float  # above - below
+    effect: float  #: above - below
     effect_interval: Interval
-    standardised: float  # effect / standard deviation around the two levels; inf without variance around them
-    gain: float  # BIC of a constant or a line, the lower one, minus BIC of the step, > 0
-    r_squared: float  # explained share of the runs' variance
-    aic: float  # n ln(RSS / n) + 2 * 4
+    standardised: float  #: effect / standard deviation around the two levels; inf without variance around them
+    gain: float  #: BIC of a constant or a line, the lower one, minus BIC of the step, > 0
+    r_squared: float  #: explained share of the runs' variance
+    aic: float  #: n ln(RSS / n) + 2 * 4
 
 
 def change_point(parameter: FloatArray, table: FloatArray | SeedTable, level: float = LEVEL) -> ChangePoint | None:

@@ -27,17 +27,17 @@ from swarmwire.world.subtick import Subticks
 class RealTimeReport:
     """Deadlines that a run in real time missed; all 0 and empty if it kept up."""
 
-    factor: float  # simulated s per s of wall time
-    missed_ticks: int  # ticks that ended before the loop waited for their end, so the next started late
-    worst_lag_s: float  # the greatest lag, wall time
-    late_answers: dict[str, int] = field(default_factory=dict[str, int])  # answers after their tick, by robot
-    watchdog_stops: dict[str, int] = field(default_factory=dict[str, int])  # robot -> number of stops
-    frames_dropped: int = 0  # middleware loss: frames to runners that no agent acted on
-    packets_dropped: int = 0  # packets in these frames: received by the radio, never by the agent
-    tx_status_dropped: int = 0  # transmit statuses in these frames: known to the radio, never to the agent
-    subtick_s: float | None = None  # wall time after which the loop woke within ticks; None: it did not
-    delivery: LatencySummary | None = None  # delivery of packets after their reception by the modelled radio
-    tick_jitter: LatencySummary | None = None  # start of ticks after the planned end of the tick before
+    factor: float  #: simulated s per s of wall time
+    missed_ticks: int  #: ticks that ended before the loop waited for their end, so the next started late
+    worst_lag_s: float  #: the greatest lag, wall time
+    late_answers: dict[str, int] = field(default_factory=dict[str, int])  #: answers after their tick, by robot
+    watchdog_stops: dict[str, int] = field(default_factory=dict[str, int])  #: robot -> number of stops
+    frames_dropped: int = 0  #: middleware loss: frames to runners that no agent acted on
+    packets_dropped: int = 0  #: packets in these frames: received by the radio, never by the agent
+    tx_status_dropped: int = 0  #: transmit statuses in these frames: known to the radio, never to the agent
+    subtick_s: float | None = None  #: wall time after which the loop woke within ticks; None: it did not
+    delivery: LatencySummary | None = None  #: delivery of packets after their reception by the modelled radio
+    tick_jitter: LatencySummary | None = None  #: start of ticks after the planned end of the tick before
 
 
 def report_of(pace: Pace, subticks: Subticks | None) -> RealTimeReport:

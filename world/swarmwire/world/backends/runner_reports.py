@@ -19,8 +19,8 @@ class RunnerEvent:
     what: RunnerEventKind
     runner: str
     robots: tuple[str, ...]
-    tick: int  # the open tick, or NO_TICK before the first
-    reason: str = ""  # cause of a loss or restart, or NOT_READY
+    tick: int  #: the open tick, or NO_TICK before the first
+    reason: str = ""  #: cause of a loss or restart, or NOT_READY
 
     def __str__(self) -> str:
         when = "before the first tick" if self.tick == NO_TICK else f"in tick {self.tick}"
@@ -41,16 +41,16 @@ _VERBS: dict[RunnerEventKind, str] = {
 class RunnerHealth:
     """The state of the runners for observers: counts since the start, except present values."""
 
-    ready: int  # present number of runners that play their robots
-    lost: int  # runners
-    late_answers: int = 0  # answers per robot that arrived after their tick, in real time
-    frames_dropped: int = 0  # frames to runners that no agent acted on
-    watchdog_stops: int = 0  # stops of robots by the watchdog, in real time
-    left: int = 0  # runners that left
-    robots_free: int = 0  # present number of robots without a runner
-    foreign: int = 0  # ready runners that sent no hashes of their agents
-    waits_s: float = 0.0  # duration of the present wait for runners
-    waits_for: str = ""  # first runner that blocks the loop, and its robots
+    ready: int  #: present number of runners that play their robots
+    lost: int  #: runners
+    late_answers: int = 0  #: answers per robot that arrived after their tick, in real time
+    frames_dropped: int = 0  #: frames to runners that no agent acted on
+    watchdog_stops: int = 0  #: stops of robots by the watchdog, in real time
+    left: int = 0  #: runners that left
+    robots_free: int = 0  #: present number of robots without a runner
+    foreign: int = 0  #: ready runners that sent no hashes of their agents
+    waits_s: float = 0.0  #: duration of the present wait for runners
+    waits_for: str = ""  #: first runner that blocks the loop, and its robots
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,8 @@ class CustomActuator(ABC):
     One instance serves all robots of a group, in all arenas.
     """
 
-    scene: Scene  # the arenas and all bodies, from `start` on
-    group: Group  # the robots with this actuator: indices `group.start` to `group.stop` - 1 in each arena
+    scene: Scene  #: the arenas and all bodies, from `start` on
+    group: Group  #: the robots with this actuator: indices `group.start` to `group.stop` - 1 in each arena
 
     @property
     def width(self) -> int:

@@ -38,12 +38,12 @@ SPREAD_KEY, SPREAD = np.array([derive_key("frames")], np.uint64), purpose("send 
 class InterfacesReport:
     """Frames of robots' interfaces over a run; a frame received by several robots counts once for each."""
 
-    sent: int  # frames read from the devices, which are packets on the medium
+    sent: int  #: frames read from the devices, which are packets on the medium
     sent_bytes: int
-    delivered: int  # frames written to the devices
+    delivered: int  #: frames written to the devices
     delivered_bytes: int
-    late: int  # frames written more than LATE_S of wall time after their reception by the modelled radio
-    delivery: LatencySummary | None  # wall time from that reception to the delivery
+    late: int  #: frames written more than LATE_S of wall time after their reception by the modelled radio
+    delivery: LatencySummary | None  #: wall time from that reception to the delivery
 
 
 class FramePorts:

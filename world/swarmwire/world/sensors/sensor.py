@@ -26,28 +26,28 @@ S = TypeVar("S", bound=SensorSpec)
 class Scene:
     """The arenas and the bodies in them; the arrays are those of the physics and always show the present."""
 
-    keys: KeyArray  # (arenas,)
-    size_m: tuple[float, float]  # full extents of an arena
+    keys: KeyArray  #: (arenas,)
+    size_m: tuple[float, float]  #: full extents of an arena
     boundary: Boundary
     obstacles: Obstacles
-    lights: tuple[tuple[Light, ...], ...]  # lights of each arena
-    ground: Ground  # the floor of all arenas
+    lights: tuple[tuple[Light, ...], ...]  #: lights of each arena
+    ground: Ground  #: the floor of all arenas
     tick_s: float
-    radius_m: FloatArray  # (robots,) radius of each robot index
-    bottom_m: FloatArray  # (robots,) height above the floor of the lower end of the body
-    top_m: FloatArray  # (robots,) height of its upper end
-    state: FloatArray  # (arenas, robots, 6) x, y in m, heading in rad (not wrapped), m/s, m/s, rad/s; arena frame
-    travel_m: FloatArray  # (arenas, robots, 2) travel of the left and right wheel since the start
-    touched: FloatArray  # (arenas, robots) 1 if it touched anything in the tick before, else 0
-    target: FloatArray  # (arenas, robots, 3) target of the engine in the tick before
-    alive: BoolArray  # (arenas, robots) dead robots stand still, and are dark
-    running: BoolArray  # (arenas,) arenas whose robots read their sensors; readings of others are not used
-    charge: FloatArray  # (arenas, robots) charge of the battery, 1 full, 0 empty
-    leds: IntArray  # (arenas, robots, LEDs) 0xRRGGBB, 0 dark
-    led_positions_m: FloatArray  # (robots, LEDs, 3) x ahead, y to the left, z above the body's lower side
-    obstacles_move: bool = False  # True: some can be pushed, and `obstacles` is written to in each tick
+    radius_m: FloatArray  #: (robots,) radius of each robot index
+    bottom_m: FloatArray  #: (robots,) height above the floor of the lower end of the body
+    top_m: FloatArray  #: (robots,) height of its upper end
+    state: FloatArray  #: (arenas, robots, 6) x, y in m, heading in rad (not wrapped), m/s, m/s, rad/s; arena frame
+    travel_m: FloatArray  #: (arenas, robots, 2) travel of the left and right wheel since the start
+    touched: FloatArray  #: (arenas, robots) 1 if it touched anything in the tick before, else 0
+    target: FloatArray  #: (arenas, robots, 3) target of the engine in the tick before
+    alive: BoolArray  #: (arenas, robots) dead robots stand still, and are dark
+    running: BoolArray  #: (arenas,) arenas whose robots read their sensors; readings of others are not used
+    charge: FloatArray  #: (arenas, robots) charge of the battery, 1 full, 0 empty
+    leds: IntArray  #: (arenas, robots, LEDs) 0xRRGGBB, 0 dark
+    led_positions_m: FloatArray  #: (robots, LEDs, 3) x ahead, y to the left, z above the body's lower side
+    obstacles_move: bool = False  #: True: some can be pushed, and `obstacles` is written to in each tick
     threads: Threads = field(default_factory=Threads)
-    shared: dict[str, Any] = field(default_factory=dict[str, Any])  # memory of custom sensors and actuators
+    shared: dict[str, Any] = field(default_factory=dict[str, Any])  #: memory of custom sensors and actuators
 
 
 def led_positions_m(groups: tuple[Group, ...], max_leds: int) -> FloatArray:
@@ -64,8 +64,8 @@ class Sensor(ABC):
     The world sets `scene` and `group`, calls `start` once, and then in each tick either `truth` or `follow`.
     """
 
-    scene: Scene  # the arenas and all bodies, from `start` on
-    group: Group  # the robots with this sensor: indices `group.start` to `group.stop` - 1 in each arena
+    scene: Scene  #: the arenas and all bodies, from `start` on
+    group: Group  #: the robots with this sensor: indices `group.start` to `group.stop` - 1 in each arena
 
     @property
     @abstractmethod

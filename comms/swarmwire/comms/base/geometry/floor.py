@@ -13,12 +13,12 @@ from swarmwire.comms.base.arrays import ByteArray
 class Patch:
     """A patch of one shade: a disc has radius_m, a convex polygon points_m."""
 
-    shape: str  # "disc" | "polygon"
+    shape: str  #: "disc" | "polygon"
     x_m: float
     y_m: float
-    shade: float  # 0 black … 1 white
+    shade: float  #: 0 black … 1 white
     radius_m: float = 0.0
-    points_m: tuple[tuple[float, float], ...] = ()  # counter-clockwise, around (x_m, y_m)
+    points_m: tuple[tuple[float, float], ...] = ()  #: counter-clockwise, around (x_m, y_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class FloorImage:
 
     rows: int
     columns: int
-    packed: str  # the greys 0 … 255, row by row from the top, deflated, in base64
+    packed: str  #: the greys 0 … 255, row by row from the top, deflated, in base64
 
     @property
     def grey(self) -> ByteArray:
@@ -41,7 +41,7 @@ class FloorImage:
 class Floor:
     """The floor of every arena: a shade, on it a picture, on it patches, of which the last wins."""
 
-    shade: float = 1.0  # 0 black … 1 white, where neither picture nor patch covers the floor
+    shade: float = 1.0  #: 0 black … 1 white, where neither picture nor patch covers the floor
     patches: tuple[Patch, ...] = ()
     image: FloorImage | None = None
 

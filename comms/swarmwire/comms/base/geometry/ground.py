@@ -19,14 +19,14 @@ WHITE = Floor()
 class Ground(NamedTuple):
     """The floor, the same in every arena. Patch k has the sides side_start[k] to side_start[k + 1] - 1, a disc none."""
 
-    width_m: float  # width and height of the arena
+    width_m: float  #: width and height of the arena
     height_m: float
-    wraps: bool  # on a torus, where a patch goes on at the opposite side
-    shade: float  # 0 black … 1 white, where nothing covers the floor
-    grey: ByteArray  # (rows, columns) top row first, over the whole arena; (0, 0) without a picture
-    patch: FloatArray  # (patches, 4) x, y, radius of a circle around it in m, shade
-    side_start: IntArray  # (patches + 1,)
-    side: FloatArray  # (sides, 5) as `geometry.sides_of` has them, around the patch's x, y
+    wraps: bool  #: on a torus, where a patch goes on at the opposite side
+    shade: float  #: 0 black … 1 white, where nothing covers the floor
+    grey: ByteArray  #: (rows, columns) top row first, over the whole arena; (0, 0) without a picture
+    patch: FloatArray  #: (patches, 4) x, y, radius of a circle around it in m, shade
+    side_start: IntArray  #: (patches + 1,)
+    side: FloatArray  #: (sides, 5) as `geometry.sides_of` has them, around the patch's x, y
 
 
 def ground_of(floor: Floor | None, size_m: tuple[float, float], boundary: Boundary) -> Ground:

@@ -16,14 +16,14 @@ from swarmwire.comms.base.kernels import njit
 class Obstacles(NamedTuple):
     """The obstacles of every arena: those of arena a are rows start[a] to start[a + 1] - 1 of each kind."""
 
-    circle_start: IntArray  # (arenas + 1,)
-    circle: FloatArray  # (circles, 3) x, y, radius in m
-    polygon_start: IntArray  # (arenas + 1,)
-    polygon: FloatArray  # (polygons, 3) x, y, radius in m of a circle around it
-    side_start: IntArray  # (polygons + 1,) polygon k has the sides side_start[k] to side_start[k + 1] - 1
-    side: FloatArray  # (sides, 5) of `sides_of`
-    circle_top_m: FloatArray  # (circles,) height of the top; inf: above everything
-    polygon_top_m: FloatArray  # (polygons,) likewise
+    circle_start: IntArray  #: (arenas + 1,)
+    circle: FloatArray  #: (circles, 3) x, y, radius in m
+    polygon_start: IntArray  #: (arenas + 1,)
+    polygon: FloatArray  #: (polygons, 3) x, y, radius in m of a circle around it
+    side_start: IntArray  #: (polygons + 1,) polygon k has the sides side_start[k] to side_start[k + 1] - 1
+    side: FloatArray  #: (sides, 5) of `sides_of`
+    circle_top_m: FloatArray  #: (circles,) height of the top; inf: above everything
+    polygon_top_m: FloatArray  #: (polygons,) likewise
 
 
 @njit()

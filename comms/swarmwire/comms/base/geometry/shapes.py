@@ -16,15 +16,15 @@ Boundary = Literal["walls", "open", "torus"]  # at the arena's edge: walls, noth
 class Obstacle:
     """An object that stops bodies and rays; a cylinder has radius_m, a box size_m, a polygon points_m."""
 
-    shape: str  # "cylinder" | "box" | "polygon"
+    shape: str  #: "cylinder" | "box" | "polygon"
     x_m: float
     y_m: float
     heading_rad: float = 0.0
     radius_m: float = 0.0
     size_m: tuple[float, float] = (0.0, 0.0)
-    points_m: tuple[tuple[float, float], ...] = ()  # convex, counter-clockwise, around (x_m, y_m) at heading 0
-    height_m: float = inf  # height of its top above the floor; inf: above everything
-    mass_kg: float | None = None  # None: fixed; else robots can push it
+    points_m: tuple[tuple[float, float], ...] = ()  #: convex, counter-clockwise, around (x_m, y_m) at heading 0
+    height_m: float = inf  #: height of its top above the floor; inf: above everything
+    mass_kg: float | None = None  #: None: fixed; else robots can push it
 
     @property
     def movable(self) -> bool:

@@ -67,16 +67,16 @@ class CameraSpec(SensorSpec):
 class Blob:
     """An LED of another robot in view."""
 
-    distance_m: float  # distance over the floor from the body's centre
-    bearing_rad: float  # (-pi, pi], 0 ahead, positive to the left, in the body's frame
-    colour: int  # 0xRRGGBB
+    distance_m: float  #: distance over the floor from the body's centre
+    bearing_rad: float  #: (-pi, pi], 0 ahead, positive to the left, in the body's frame
+    colour: int  #: 0xRRGGBB
 
 
 @dataclass(frozen=True)
 class CameraReading:
     """The blobs in view of one robot's omnidirectional camera."""
 
-    blobs: list[Blob]  # nearest first, by true distance
+    blobs: list[Blob]  #: nearest first, by true distance
 
     @classmethod
     def from_columns(cls, distance_m: FloatArray, bearing_rad: FloatArray, colour: FloatArray) -> "CameraReading":
@@ -89,9 +89,9 @@ class CameraReading:
 class CameraReadings:
     """The blobs in view of n robots' cameras: a column per blob, sorted by true distance; nan after the last blob."""
 
-    distance_m: FloatArray  # (n, max_blobs) over the floor, from the body's centre
-    bearing_rad: FloatArray  # (n, max_blobs) in the body's frame, (-pi, pi], 0 ahead, positive to the left
-    colour: FloatArray  # (n, max_blobs) 0xRRGGBB
+    distance_m: FloatArray  #: (n, max_blobs) over the floor, from the body's centre
+    bearing_rad: FloatArray  #: (n, max_blobs) in the body's frame, (-pi, pi], 0 ahead, positive to the left
+    colour: FloatArray  #: (n, max_blobs) 0xRRGGBB
 
     @property
     def count(self) -> IntArray:

@@ -60,6 +60,6 @@ class ImuSpec(SensorSpec):
 class ImuReading(Generic[N]):
     """Acceleration and turn rate in the body's frame: means over the previous tick."""
 
-    forward_mps2: N  # acceleration ahead
-    left_mps2: N  # acceleration to the left: in a left turn it is positive
-    turn_radps: N  # turn rate, positive to the left
+    forward_mps2: N  #: acceleration ahead
+    left_mps2: N  #: acceleration to the left: in a left turn it is positive
+    turn_radps: N  #: turn rate, positive to the left

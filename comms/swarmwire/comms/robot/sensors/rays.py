@@ -57,7 +57,7 @@ S = TypeVar("S", bound=RadialSpec)
 class RadialReading(Generic[N, S]):
     """A reading of sensors around the body, in the order of the spec (use the angles, never the indices)."""
 
-    value: FloatArray  # (…, sensors) the response, 0 to 1
+    value: FloatArray  #: (…, sensors) the response, 0 to 1
     spec: S
     if not TYPE_CHECKING:
         value = LazyArray()
@@ -169,7 +169,7 @@ class ResponseCurve:
 class RayArraySpec(RadialSpec):
     """Rays that start at the body's rim and respond to the nearest object on them."""
 
-    meaning: ClassVar[str]  # meaning of a reading's value
+    meaning: ClassVar[str]  #: meaning of a reading's value
 
     range_m: float = parameter(help="length of a ray from the rim", unit="m", above=0)
     response: ResponseCurve = parameter(help="response to distance")

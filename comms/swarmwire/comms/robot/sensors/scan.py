@@ -86,7 +86,7 @@ class ScanSpec(RangedSensorSpec):
 class ScanReading:
     """A reading of the scanner."""
 
-    range_m: FloatArray  # (…, rays) from the scanner; inf where nothing is within its range
+    range_m: FloatArray  #: (…, rays) from the scanner; inf where nothing is within its range
     spec: ScanSpec
     if not TYPE_CHECKING:
         range_m = LazyArray()

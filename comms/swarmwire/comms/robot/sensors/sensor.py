@@ -32,7 +32,7 @@ class Noise:
     """Random error of size `size + relative * |value|`: half width if uniform, standard deviation if normal."""
 
     kind: Literal["uniform", "normal"] = "normal"
-    size: float = 0.0  # unit of the field
+    size: float = 0.0  #: unit of the field
     relative: float = 0.0
 
 
@@ -43,18 +43,18 @@ NO_NOISE = Noise()
 class Field:
     """A field of a reading. Values that are not finite (a ray without an echo) get no noise and are not clipped."""
 
-    name: str  # "value"
-    width: int = 0  # 0: a number per robot, (n,); otherwise (n, width)
+    name: str  #: "value"
+    width: int = 0  #: 0: a number per robot, (n,); otherwise (n, width)
     noise: Noise = NO_NOISE
-    step: float = 0.0  # values are rounded to multiples of the step; 0: no rounding
-    low: float = -inf  # values are clipped to [low, high]
+    step: float = 0.0  #: values are rounded to multiples of the step; 0: no rounding
+    low: float = -inf  #: values are clipped to [low, high]
     high: float = inf
-    blank: float = nan  # value of a lost reading
-    angle: bool = False  # True: values are wrapped to (-pi, pi]
-    span: tuple[float, float] | None = None  # range of outliers; None: low to high
+    blank: float = nan  #: value of a lost reading
+    angle: bool = False  #: True: values are wrapped to (-pi, pi]
+    span: tuple[float, float] | None = None  #: range of outliers; None: low to high
     unit: str = ""
-    help: str = ""  # meaning, for descriptions
-    per: str = ""  # plural of the parts that have a value each, for descriptions: "rays"
+    help: str = ""  #: meaning, for descriptions
+    per: str = ""  #: plural of the parts that have a value each, for descriptions: "rays"
 
     @property
     def shape(self) -> str:
@@ -75,8 +75,8 @@ class SensorSpec:
     steps; clipping to the range; drop-out. The agent sees it from `delay_s` later until the next reading arrives.
     """
 
-    is_global: ClassVar[bool] = False  # True: it measures more than the robot and its surroundings
-    truth: ClassVar[str] = ""  # "package.module:Class" of the truth in the world
+    is_global: ClassVar[bool] = False  #: True: it measures more than the robot and its surroundings
+    truth: ClassVar[str] = ""  #: "package.module:Class" of the truth in the world
 
     rate_hz: float = parameter(
         0.0, help="new readings per second, taken at ticks; 0: one in each tick", unit="Hz", at_least=0

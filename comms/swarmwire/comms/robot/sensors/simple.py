@@ -64,7 +64,7 @@ class BatterySpec(SensorSpec):
 class BatteryReading(Generic[N]):
     """A reading of the battery's gauge."""
 
-    charge: N  # 1 full, 0 empty; an empty battery stops the motors
+    charge: N  #: 1 full, 0 empty; an empty battery stops the motors
     voltage_v: N
 
 
@@ -87,7 +87,7 @@ class BumperSpec(SensorSpec):
 class BumperReading:
     """A reading of one robot's bumper."""
 
-    pressed: bool  # touched a robot, an obstacle or a wall in the tick before
+    pressed: bool  #: touched a robot, an obstacle or a wall in the tick before
 
     @classmethod
     def from_columns(cls, pressed: float) -> "BumperReading":
@@ -99,7 +99,7 @@ class BumperReading:
 class BumperReadings:
     """Readings of the bumpers of n robots."""
 
-    pressed: FloatArray  # (n,) 1 for a robot that touched anything in the tick before, else 0
+    pressed: FloatArray  #: (n,) 1 for a robot that touched anything in the tick before, else 0
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class CompassSpec(RangedSensorSpec):
 class CompassReading(Generic[N]):
     """A reading of the compass."""
 
-    heading_rad: N  # 0 along the arena's +x, counter-clockwise, in (-pi, pi]
+    heading_rad: N  #: 0 along the arena's +x, counter-clockwise, in (-pi, pi]
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ class FlowReading(Generic[N]):
     """Velocity over the floor, in the body's frame."""
 
     forward_mps: N
-    left_mps: N  # positive to the left
+    left_mps: N  #: positive to the left
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ class GroundSpec(RangedSensorSpec):
 class GroundReading:
     """A reading of the ground sensors, in the order of the spec."""
 
-    shade: FloatArray  # (…, points) 0 black to 1 white
+    shade: FloatArray  #: (…, points) 0 black to 1 white
     if not TYPE_CHECKING:
         shade = LazyArray()
 
@@ -261,7 +261,7 @@ class OdometrySpec(SensorSpec):
 class OdometryReading(Generic[N]):
     """A reading of the wheel encoders."""
 
-    left_m: N  # travelled by the left wheel since the start
+    left_m: N  #: travelled by the left wheel since the start
     right_m: N
 
 

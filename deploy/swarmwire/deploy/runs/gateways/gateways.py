@@ -42,9 +42,9 @@ class Gateways:
     """
 
     kinds: Mapping[str, str]
-    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  # keys: "option" for all, or "group.option"
-    swarm: str = "swarm"  # the root of the network's keys
-    network: Network = LOOPBACK  # the run's endpoints; the default is a free port of this machine
+    options: Mapping[str, Any] = field(default_factory=dict[str, Any])  #: keys: "option" for all, or "group.option"
+    swarm: str = "swarm"  #: the root of the network's keys
+    network: Network = LOOPBACK  #: the run's endpoints; the default is a free port of this machine
 
 
 GatewayOption = Gateways | Mapping[str, str] | str | None

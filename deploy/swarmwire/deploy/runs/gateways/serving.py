@@ -57,10 +57,10 @@ class Served:
     groups: tuple[GatewayGroup, ...]
     robots: tuple[ServedRobot, ...]
     medium: RadioBridge | None
-    show: Callable[[], None]  # publishes the poses of all robots
-    show_counts: Callable[[], dict[str, int]]  # counts of poses that were not published
+    show: Callable[[], None]  #: publishes the poses of all robots
+    show_counts: Callable[[], dict[str, int]]  #: counts of poses that were not published
     swarm: str
-    endpoints: tuple[str, ...]  # endpoints of the robots' network
+    endpoints: tuple[str, ...]  #: endpoints of the robots' network
 
     def robot_addresses(self) -> dict[int, tuple[str, str]]:
         """Return the gateway's address by robot index: on a robot with a network of its own, and outside."""

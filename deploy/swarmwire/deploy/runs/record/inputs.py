@@ -36,11 +36,11 @@ WITHIN = "within/"  # array of the packets that came within the tick; also the p
 class InputsRecord:
     """The recorded inputs of a run."""
 
-    path: str  # path within the run folder
-    sha256: str  # hash of the file
-    first_tick: int  # first recorded tick; actions before it follow from scenario and seed
-    ticks: int  # number of ticks from the first recorded one to the end of the run
-    ticks_not_recorded: int  # number of ticks that could not be written, as on a full disk
+    path: str  #: path within the run folder
+    sha256: str  #: hash of the file
+    first_tick: int  #: first recorded tick; actions before it follow from scenario and seed
+    ticks: int  #: number of ticks from the first recorded one to the end of the run
+    ticks_not_recorded: int  #: number of ticks that could not be written, as on a full disk
 
 
 class RecordedBackend:

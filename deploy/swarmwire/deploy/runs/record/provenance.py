@@ -44,17 +44,17 @@ SOURCES = (".py", ".toml")  # code, and the data sheets of bodies
 class RunFacts:
     """The provenance of a run, in the order of `run.json`. Paths are within the run folder."""
 
-    seeds: tuple[int, ...]  # seed of each arena
-    ticks: int  # planned ticks
-    runners: int  # 0: all agents in the world's process
-    realtime: float | None  # simulated s per s of wall time; None: lockstep, as fast as possible
-    files: tuple[CopiedFile, ...]  # files in the run folder from which the run can be repeated
-    modules: Mapping[str, str]  # sha256 of the installed code: swarmwire's parts and packages of agents
+    seeds: tuple[int, ...]  #: seed of each arena
+    ticks: int  #: planned ticks
+    runners: int  #: 0: all agents in the world's process
+    realtime: float | None  #: simulated s per s of wall time; None: lockstep, as fast as possible
+    files: tuple[CopiedFile, ...]  #: files in the run folder from which the run can be repeated
+    modules: Mapping[str, str]  #: sha256 of the installed code: swarmwire's parts and packages of agents
     cpu: str
     versions: Mapping[str, str]
-    gateways: Mapping[str, str]  # kind of the gateway of each group that has one
+    gateways: Mapping[str, str]  #: kind of the gateway of each group that has one
     metrics: tuple[MetricInfo, ...]
-    subtick_s: float | None  # wall time after which packets crossed between ticks; None: at the starts of ticks
+    subtick_s: float | None  #: wall time after which packets crossed between ticks; None: at the starts of ticks
 
     def changes(self, folder: Path, code: Sequence[str]) -> list[str]:
         """Return the differences between then and now, one line each; `code` has the specs of users' classes."""

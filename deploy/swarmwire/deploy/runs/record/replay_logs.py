@@ -31,8 +31,8 @@ from swarmwire.world.live_events import LiveEvent
 class LiveEventsRecord:
     """The recorded live events of a run."""
 
-    path: str  # path within the run folder
-    sha256: str  # hash of the file
+    path: str  #: path within the run folder
+    sha256: str  #: hash of the file
     lines: int
 
 

@@ -45,13 +45,13 @@ DEFAULT_STAT: Stat = "q50"
 class Response:
     """A measured variable of the runs, one column. A `time` may be missing: the run ended first, right-censored."""
 
-    column: str  # name in summary.parquet, e.g. order.final
-    unit: str  # "" without a unit
+    column: str  #: name in summary.parquet, e.g. order.final
+    unit: str  #: "" without a unit
     kind: Kind
-    help: str  # one line
-    listed: bool = False  # True for a metric that the scenario lists, in addition to the standard ones
-    hold_s: float = 0.0  # hold time after which the time is known
-    label: str = ""  # title for reports; "": derived from the column
+    help: str  #: one line
+    listed: bool = False  #: True for a metric that the scenario lists, in addition to the standard ones
+    hold_s: float = 0.0  #: hold time after which the time is known
+    label: str = ""  #: title for reports; "": derived from the column
 
     def watched_s(self, end_s: FloatArray) -> FloatArray:
         """Return the censoring times of runs that ended at `end_s`: a later start leaves less than the hold time."""
@@ -67,13 +67,13 @@ class Response:
 class Provenance:
     """Origin of a campaign or a tuning: the scenario's files, the code and the machine."""
 
-    scenario: str  # name
-    command: str  # command that began it
-    began_utc: str  # ISO 8601
-    versions: Mapping[str, str]  # versions of Python and packages
+    scenario: str  #: name
+    command: str  #: command that began it
+    began_utc: str  #: ISO 8601
+    versions: Mapping[str, str]  #: versions of Python and packages
     cpu: str
-    modules: Mapping[str, str]  # sha256 of the installed code, by module
-    files: tuple[CopiedFile, ...]  # files in the folder of the scenario
+    modules: Mapping[str, str]  #: sha256 of the installed code, by module
+    files: tuple[CopiedFile, ...]  #: files in the folder of the scenario
 
 
 @dataclass(frozen=True)
@@ -82,17 +82,17 @@ class Campaign(Provenance):
 
     name: str
     design: Design
-    seeds: tuple[int, ...]  # the same at every point
-    vary: Mapping[str, list[Value] | Mapping[str, Value]]  # path -> values in order, or {"from", "to"}
+    seeds: tuple[int, ...]  #: the same at every point
+    vary: Mapping[str, list[Value] | Mapping[str, Value]]  #: path -> values in order, or {"from", "to"}
     points: tuple[Point, ...]
-    overrides: tuple[str, ...]  # overrides of all points; the scenario in the folder includes them
-    point_overrides: tuple[tuple[str, ...], ...]  # overrides of each point, for the scenario in the folder
-    duration_s: float  # duration of a run without stop conditions
-    robots: int  # robots of an arena, at the point with the most
+    overrides: tuple[str, ...]  #: overrides of all points; the scenario in the folder includes them
+    point_overrides: tuple[tuple[str, ...], ...]  #: overrides of each point, for the scenario in the folder
+    duration_s: float  #: duration of a run without stop conditions
+    robots: int  #: robots of an arena, at the point with the most
     responses: tuple[Response, ...]
-    series: bool  # True if each tick's metrics are recorded
-    record_seeds: tuple[int, ...]  # seeds whose runs have run folders
-    batch: int | None  # largest number of arenas in a world; None: chosen by the schedule
+    series: bool  #: True if each tick's metrics are recorded
+    record_seeds: tuple[int, ...]  #: seeds whose runs have run folders
+    batch: int | None  #: largest number of arenas in a world; None: chosen by the schedule
 
     @property
     def runs(self) -> int:

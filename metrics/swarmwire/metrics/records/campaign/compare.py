@@ -51,7 +51,7 @@ class ComparisonRow:
     second_point: Point
     first: Summary
     second: Summary
-    difference: Difference  # second - first
+    difference: Difference  #: second - first
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,9 @@ class CampaignComparison:
 
     first: PointSelection
     second: PointSelection
-    paths: tuple[str, ...]  # parameters with equal values at both points of every row
+    paths: tuple[str, ...]  #: parameters with equal values at both points of every row
     rows: tuple[ComparisonRow, ...]
-    level: float  # confidence level of the intervals
+    level: float  #: confidence level of the intervals
 
 
 def compare(

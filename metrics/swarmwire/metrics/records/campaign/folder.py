@@ -212,10 +212,10 @@ def _sample(
 class PointSelection:
     """Points of a campaign, by their numbers."""
 
-    text: str  # FOLDER@path=value, for messages
+    text: str  #: FOLDER@path=value, for messages
     campaign: CampaignFolder
     points: tuple[int, ...]
-    pinned: frozenset[str]  # parameters with a selected value
+    pinned: frozenset[str]  #: parameters with a selected value
 
 
 def select(text: str) -> PointSelection:

@@ -43,7 +43,7 @@ TICK_COLUMNS = (*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO)  # nam
 class CopiedFile:
     """A copy of a file that a repetition of the run needs, from the start of the run."""
 
-    path: str  # relative to the run folder
+    path: str  #: relative to the run folder
     sha256: str
     # "scenario" | "agent" | "trace" | "map" | "ground" | "body" | "custom sensor" | "custom actuator" | "metric"
     what: str
@@ -54,10 +54,10 @@ class MetricInfo:
     """A metric that a run measured."""
 
     name: str
-    help: str  # one line: formula and unit
+    help: str  #: one line: formula and unit
     unit: str
-    kind: str  # "level", "count" or "time"
-    bounds: tuple[float | None, float | None]  # least and largest value of a tick; None: there is none
+    kind: str  #: "level", "count" or "time"
+    bounds: tuple[float | None, float | None]  #: least and largest value of a tick; None: there is none
 
 
 def metric_info(metric: Metric | type[Metric]) -> MetricInfo:
