@@ -39,8 +39,8 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     **dict.fromkeys(ENVIRONMENTS, learn),
     "agent-overhead": agent_overhead,
     "record-cost": partial(record_cost, robots=1000, ticks=600),
-    "metrics-share": partial(metrics_share, of="inprocess-1000-d1"),
-    "metrics-share-radio": partial(metrics_share, of="inprocess-1000-d1-radio"),
+    "metrics-share": partial(metrics_share, case_name="inprocess-1000-d1"),
+    "metrics-share-radio": partial(metrics_share, case_name="inprocess-1000-d1-radio"),
     "view-cost": partial(view_cost, robots=1000, ticks=600, neighbours=0.0),
     "view-cost-radio": partial(view_cost, robots=1000, ticks=600, neighbours=D1),
     **dict.fromkeys(AIRS, air_cost),
@@ -70,13 +70,13 @@ def main() -> None:
     parser = ArgumentParser(prog="python -m benchmarks")
     parser.add_argument("names", nargs="*", metavar="NAME", help="all if left out")
     parser.add_argument("--engine", help="[physics] engine of inprocess, single, replicas, laser, wire and start")
-    given = parser.parse_args()
-    for name in given.names:
+    arguments = parser.parse_args()
+    for name in arguments.names:
         if name not in {*WITH_ENGINE, *OTHERS}:
             parser.error(f"no benchmark {name!r}; there are {', '.join([*WITH_ENGINE, *OTHERS])}")
-    for name in given.names or [*WITH_ENGINE, *OTHERS]:
+    for name in arguments.names or [*WITH_ENGINE, *OTHERS]:
         if name in WITH_ENGINE:
-            WITH_ENGINE[name](name, given.engine, REPEATS)
+            WITH_ENGINE[name](name, arguments.engine, REPEATS)
         else:
             OTHERS[name](name, REPEATS)
 

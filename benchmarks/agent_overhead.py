@@ -66,7 +66,10 @@ def agent_overhead(name: str, repeats: int) -> None:
     details = {"body": "footbot", "rays": 24, "packets_per_step": PACKETS}
     for robots, ticks, at in ((1, 5000, ""), (100, 100, "-of-100")):
         overhead(WallClock(), robots, PACKETS, ticks // 10)
-        found = [overhead(WallClock(), robots, PACKETS, ticks) for _ in range(repeats)]
-        for part, values in (("step", [one.step_us for one in found]), ("packet", [one.packet_us for one in found])):
+        overheads = [overhead(WallClock(), robots, PACKETS, ticks) for _ in range(repeats)]
+        for part, values in (
+            ("step", [cost.step_us for cost in overheads]),
+            ("packet", [cost.packet_us for cost in overheads]),
+        ):
             line = {"robots": robots, **details, **spread(values)}
             print_line(f"{name}-{part}{at}", statistics.median(values), f"µs per {part}", line)

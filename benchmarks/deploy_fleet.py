@@ -61,13 +61,17 @@ def deploy_fleet(name: str, repeats: int, *, hosts: int) -> None:
         }  # fmt: skip
         print_line(f"{name}-packages", made_s, "s", {**config, "index": "pip's cache as it was"})
         for kind in KINDS:
-            found = Deployments([], [], [])
+            deployments = Deployments([], [], [])
             for _ in range(repeats):
-                _measure(kind, hosts, environments, found)
+                _measure(kind, hosts, environments, deployments)
             suffix = "" if kind == KINDS[-1] else f"-{kind}"
-            for what, values in (("-first", found.first), ("", found.release), ("-again", found.again)):
+            for stage, values in (
+                ("-first", deployments.first),
+                ("", deployments.release),
+                ("-again", deployments.again),
+            ):
                 details = {**config, "server": kind, **spread(values)}
-                print_line(f"{name}{suffix}{what}", statistics.median(values), "s", details)
+                print_line(f"{name}{suffix}{stage}", statistics.median(values), "s", details)
 
 
 def facts_here() -> HostFacts:
@@ -81,19 +85,23 @@ def facts_here() -> HostFacts:
             os.environ["HOME"] = before
 
 
-def _measure(kind: str, hosts: int, environments: LockedEnvironments, found: Deployments) -> None:
+def _measure(kind: str, hosts: int, environments: LockedEnvironments, deployments: Deployments) -> None:
     with tempfile.TemporaryDirectory() as text:
         folder = Path(text)
         write_key(new_key(), folder / "id")
-        with _served(kind, hosts, folder) as known:
-            (folder / "known_hosts").write_text("".join(f"[127.0.0.1]:{port} {line}" for port, line in known))
+        with _served(kind, hosts, folder) as endpoints:
+            (folder / "known_hosts").write_text("".join(f"[127.0.0.1]:{port} {line}" for port, line in endpoints))
             robots = "".join(
-                f'[robots.flock-{place}]\naddress = "127.0.0.1"\nport = {port}\n'
-                f'driver = {{ name = "epuck2", address = "192.168.1.{place + 1}" }}\n'
-                for place, (port, _) in enumerate(known)
+                f'[robots.flock-{index}]\naddress = "127.0.0.1"\nport = {port}\n'
+                f'driver = {{ name = "epuck2", address = "192.168.1.{index + 1}" }}\n'
+                for index, (port, _) in enumerate(endpoints)
             )
             (folder / "fleet.toml").write_text(FLEET.format(user=getpass.getuser()) + robots)
-            for source, times in ((AGENT, found.first), (f"{AGENT}\n", found.release), (f"{AGENT}\n", found.again)):
+            for source, times in (
+                (AGENT, deployments.first),
+                (f"{AGENT}\n", deployments.release),
+                (f"{AGENT}\n", deployments.again),
+            ):
                 (folder / "still.py").write_text(source)
                 times.append(_deployed(read_fleet(folder / "fleet.toml"), environments))
 

@@ -20,7 +20,7 @@ def main() -> None:
     client_key = asyncssh.read_private_key(str(folder / "id"))
     with ExitStack() as stack:
         servers = stack.enter_context(host_servers(client_key))
-        hosts = [_host(kind, folder / f"home-{place}", servers, client_key, stack) for place in range(count)]
+        hosts = [_host(kind, folder / f"home-{index}", servers, client_key, stack) for index in range(count)]
         print(json.dumps([[host.port, host.host_key.export_public_key().decode()] for host in hosts]), flush=True)
         sys.stdin.read()
 

@@ -18,14 +18,14 @@ def main(processes: int, sent_bytes: int, answer_bytes: int) -> None:
     gc.freeze()  # as the agent host does: the collector would copy shared pages
     sockets = [_forked(answer_bytes) for _ in range(processes)]
     ready = select.epoll()
-    for own in sockets:
-        ready.register(own, select.EPOLLIN)
-    by_file = {own.fileno(): own for own in sockets}
+    for world_socket in sockets:
+        ready.register(world_socket, select.EPOLLIN)
+    by_file = {world_socket.fileno(): world_socket for world_socket in sockets}
     frame, clock = bytes(sent_bytes), WallClock()
     for _ in sys.stdin:
         start_ns = clock.now_ns()
-        for own in sockets:
-            own.send(frame)
+        for world_socket in sockets:
+            world_socket.send(frame)
         missing = processes
         while missing:
             for file, _ in ready.poll():
@@ -35,15 +35,15 @@ def main(processes: int, sent_bytes: int, answer_bytes: int) -> None:
 
 
 def _forked(answer_bytes: int) -> socket.socket:
-    own, of_process = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    world_socket, process_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     if os.fork() == 0:
-        own.close()
+        world_socket.close()
         answer = bytes(answer_bytes)
-        while of_process.recv(4096):
-            of_process.send(answer)
+        while process_socket.recv(4096):
+            process_socket.send(answer)
         os._exit(0)
-    of_process.close()
-    return own
+    process_socket.close()
+    return world_socket
 
 
 if __name__ == "__main__":

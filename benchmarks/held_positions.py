@@ -65,7 +65,7 @@ def drives(edge: Edge, speed_mps: float) -> tuple[FloatArray, FloatArray, FloatA
     which packets are sent are uniform over the edge and 2 ticks' way around it. The last is their number per metre.
     """
     rng, way_m = np.random.default_rng(1), speed_mps * PACKETS * INTERVAL_S
-    low_m, high_m = _around(edge, speed_mps)
+    low_m, high_m = _distance_range(edge, speed_mps)
     share = (np.arange(PAIRS) + rng.uniform(0.0, 1.0, PAIRS)) / PAIRS
     apart_m = low_m - way_m + share * (high_m - low_m + way_m)
     start_m = np.concatenate([apart_m, apart_m + way_m])
@@ -74,7 +74,7 @@ def drives(edge: Edge, speed_mps: float) -> tuple[FloatArray, FloatArray, FloatA
     return start_m, sent_s, speeds_mps, PAIRS * PACKETS / (high_m - low_m + way_m)
 
 
-def _around(edge: Edge, speed_mps: float) -> tuple[float, float]:
+def _distance_range(edge: Edge, speed_mps: float) -> tuple[float, float]:
     margin_m = NEAR_M + 2.0 * speed_mps / min(RATES_HZ)
     return edge.near_m - margin_m, edge.far_m + margin_m
 
@@ -83,7 +83,7 @@ def received(
     radio: Radio, start_m: FloatArray, sent_s: FloatArray, speeds_mps: FloatArray, rate_hz: int, to: int = BROADCAST
 ) -> BoolArray:
     """Which packets of each pair are received with ticks of this rate, (pairs, PACKETS); `to` 1 is acknowledged."""
-    pairs, found = len(start_m), np.zeros(sent_s.shape, np.bool_)
+    pairs, delivered = len(start_m), np.zeros(sent_s.shape, np.bool_)
     keys = np.array([derive_key("held positions", pair) for pair in range(pairs)], np.uint64)
     size_m = 3.0 * float(start_m.max()), 2.0
     medium = RadioMedium(ChannelContext.open_space(radio, keys, 2, size_m), rate_hz)
@@ -93,12 +93,12 @@ def received(
         at_ns, until_ns = tick_start_ns(tick, rate_hz), tick_start_ns(tick + 1, rate_hz)
         pose[:, 1, 0] = start_m + speeds_mps * (at_ns / NS_PER_S)
         got = medium.step(at_ns, pose.reshape(-1, 3).copy()).received
-        found[got.receiver // 2, got.sequence] = True
+        delivered[got.receiver // 2, got.sequence] = True
         pair, packet = np.nonzero((at_ns <= sent_at_ns) & (sent_at_ns < until_ns))
         if len(pair):
             payloads = Payloads.from_rows([bytes(PAYLOAD_BYTES)] * len(pair))
             medium.send_at(sent_at_ns[pair, packet], SentPackets(2 * pair, np.full(len(pair), to), payloads))
-    return found
+    return delivered
 
 
 def rows(name: str, speed_mps: float) -> Iterator[list[str]]:
@@ -108,7 +108,7 @@ def rows(name: str, speed_mps: float) -> Iterator[list[str]]:
     edge = edge_of(radio)
     start_m, sent_s, speeds_mps, per_m = drives(edge, speed_mps)
     distance_m = start_m[:, None] + speeds_mps[:, None] * sent_s
-    low_m, high_m = _around(edge, speed_mps)
+    low_m, high_m = _distance_range(edge, speed_mps)
     counts = (distance_m >= low_m) & (distance_m < high_m)
     is_near = np.abs(distance_m - edge.half_m) <= NEAR_M
     exact = received(radio, start_m, sent_s, speeds_mps, REFERENCE_HZ)

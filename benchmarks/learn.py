@@ -30,8 +30,8 @@ UV = Path(__file__).parents[1] / ".ci" / "uv"
 
 def reward(state: ArenaState) -> FloatArray:
     """Near the others, and without contacts, (arenas,)."""
-    place = state.pose[:, :, :2]
-    apart_m = np.hypot(*np.moveaxis(place - place.mean(axis=1, keepdims=True), 2, 0)).mean(axis=1)
+    position = state.pose[:, :, :2]
+    apart_m = np.hypot(*np.moveaxis(position - position.mean(axis=1, keepdims=True), 2, 0)).mean(axis=1)
     return -apart_m - 0.1 * state.contacts.sum(axis=1)
 
 
@@ -48,7 +48,7 @@ def robot_steps(arenas: int) -> tuple[float, float]:
         seen = envs.step(actions[steps % len(actions)])[0]
         steps += 1
     layout = envs.layouts["flock"]
-    present = [place for place, name in enumerate(layout.observation) if name.endswith(" present")]
+    present = [index for index, name in enumerate(layout.observation) if name.endswith(" present")]
     return steps * arenas * ROBOTS / taken_s, float(seen[:, :, present].sum(axis=2).mean())
 
 
@@ -68,7 +68,7 @@ def vmas_steps(python: Path, arenas: int) -> float:
     return float(json.loads(done.stdout))
 
 
-def beside(python: Path, repeats: int) -> None:
+def compare(python: Path, repeats: int) -> None:
     """Both, in turns, for each case."""
     for name, arenas in CASES.items():
         pairs = [(robot_steps(arenas)[0], vmas_steps(python, arenas)) for _ in range(repeats)]
@@ -82,15 +82,15 @@ def main() -> None:
     parser = ArgumentParser(prog="python -m benchmarks.learn")
     parser.add_argument("--vmas", type=Path, help="a Python with VMAS and PyTorch; left out: they are installed")
     parser.add_argument("--repeats", type=int, default=3)
-    given = parser.parse_args()
-    if given.vmas:
-        beside(given.vmas, given.repeats)
+    arguments = parser.parse_args()
+    if arguments.vmas:
+        compare(arguments.vmas, arguments.repeats)
         return
     with tempfile.TemporaryDirectory(prefix="swarmwire-vmas-") as folder:
         python = Path(folder) / "bin" / "python"
         subprocess.run([UV, "venv", "--quiet", "--clear", "--python", sys.executable, folder], check=True)
         subprocess.run([UV, "pip", "install", "--quiet", "--python", python, *VMAS], check=True)
-        beside(python, given.repeats)
+        compare(python, arguments.repeats)
 
 
 if __name__ == "__main__":

@@ -31,8 +31,10 @@ def report(name: str, value: float, unit: str, result: Result, config: dict[str,
 def print_line(name: str, value: float, unit: str, details: dict[str, Any]) -> None:
     """Print a value, its target, and all that it was measured under."""
     target = TARGETS.get(name)
-    asked = {"at_most" if target.at_most else "at_least": target.value, "met": target.met_by(value)} if target else {}
-    line = {"name": name, "value": round(value, 3), "unit": unit, **asked, **details, "cpu": cpu()}
+    target_fields = (
+        {"at_most" if target.at_most else "at_least": target.value, "met": target.met_by(value)} if target else {}
+    )
+    line = {"name": name, "value": round(value, 3), "unit": unit, **target_fields, **details, "cpu": cpu()}
     print(json.dumps(line), flush=True)
 
 

@@ -45,13 +45,13 @@ class Timed(Observer):
         return 100.0 * spent_ns[name] / (rest_ns + spent_ns[name])
 
 
-def metrics_share(name: str, repeats: int, *, of: str) -> None:
+def metrics_share(name: str, repeats: int, *, case_name: str) -> None:
     """Time spent on metrics over that of the whole run, in percent, for a case of `robot_steps`.
 
     Both sets are timed within the same runs, so that what else the machine does falls on all. The radio graph, which
     the loop makes for observers, counts as the run's.
     """
-    case = CASES[of]
+    case = CASES[case_name]
     scenario = scenario_from({**case.scene(None), "standard_metrics": False}, name)
     run(scenario.model_copy(update={"duration_s": 2.0}), observers=[Timed()])
     timed = [Timed() for _ in range(repeats)]
@@ -60,5 +60,5 @@ def metrics_share(name: str, repeats: int, *, of: str) -> None:
         raise RuntimeError("a metric failed: its cost says nothing")
     for suffix, chosen in SETS.items():
         shares = [observer.share_percent(suffix) for observer in timed]
-        details = {"of": of, "robots": case.robots, "ticks": case.ticks, "metrics": len(Metrics(chosen).metrics)}
+        details = {"of": case_name, "robots": case.robots, "ticks": case.ticks, "metrics": len(Metrics(chosen).metrics)}
         print_line(f"{name}{suffix}", statistics.median(shares), "% of the run", {**details, **spread(shares)})

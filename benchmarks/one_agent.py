@@ -75,9 +75,9 @@ def numbers(folder: RunFolder, names: Iterable[str], duration_s: float, arena: i
     moving = np.any([np.stack(ticks[name].to_list()) != 0.0 for name in MOVING], axis=0)
     if not moving.any(axis=0).all():
         raise RuntimeError(f"{folder.path}: a robot never moved")
-    first, wanted = int(moving.argmax(axis=0).max()), round(duration_s * folder.static.rate_hz)
-    compared = ticks[first : first + wanted]
-    if len(compared) < wanted:
+    first, tick_count = int(moving.argmax(axis=0).max()), round(duration_s * folder.static.rate_hz)
+    compared = ticks[first : first + tick_count]
+    if len(compared) < tick_count:
         raise RuntimeError(f"{folder.path}: a robot moved only after {first} ticks")
     means = {name: float(np.nanmean(compared[name].to_numpy())) for name in names}
     return means | {name: float(compared[name][-1] - compared[name][0]) for name in COUNTS}
@@ -94,8 +94,10 @@ def emulated(case: Case, duration_s: float, seeds: Sequence[int] = EMULATED_SEED
 def is_same_per_process(case: Case, duration_s: float) -> bool:
     """Whether the run with a process per robot is the same, bit for bit."""
     overrides = overrides_of(case, duration_s)
-    one, other = (run(case.scenario, seed=1, overrides=overrides, runners=runners) for runners in ("none", "per-robot"))
-    return one.arenas[0].trajectory_sha256 == other.arenas[0].trajectory_sha256
+    in_process, per_robot = (
+        run(case.scenario, seed=1, overrides=overrides, runners=runners) for runners in ("none", "per-robot")
+    )
+    return in_process.arenas[0].trajectory_sha256 == per_robot.arenas[0].trajectory_sha256
 
 
 def through_gateway(case: Case, duration_s: float, seed: int, pace: float = 1.0) -> tuple[dict[str, float], float]:
@@ -107,9 +109,9 @@ def through_gateway(case: Case, duration_s: float, seed: int, pace: float = 1.0)
     with TemporaryDirectory() as folder:
         out = Path(folder) / "run"
         result = driven(case.scenario, case.gateway, out, pace=pace, overrides=overrides, together=False, record=TABLES)
-        found = numbers(RunFolder(out), case.means, duration_s)
+        measured = numbers(RunFolder(out), case.means, duration_s)
     assert result.realtime is not None
-    return found, result.realtime.missed_ticks / result.ticks
+    return measured, result.realtime.missed_ticks / result.ticks
 
 
 def rows(name: str, case: Case, duration_s: float, seeds: int, pace: float) -> Iterator[str]:
@@ -117,11 +119,11 @@ def rows(name: str, case: Case, duration_s: float, seeds: int, pace: float) -> I
     expected, same = emulated(case, duration_s), is_same_per_process(case, duration_s)
     runs = [through_gateway(case, duration_s, seed, pace) for seed in range(1, seeds + 1)]
     print(name, *(f"seed {1 + i}: {missed:.1%} of the ticks missed" for i, (_, missed) in enumerate(runs)), sep="\n  ")
-    found = _columns([of for of, _ in runs])
+    measured = _columns([values for values, _ in runs])
     yield _row(name, "in process", (_shown(values) for values in expected.values()))
     yield _row("", "process per robot", ["the same, bit for bit" if same else "differs", *[""] * (len(expected) - 1)])
-    within = {metric: here.min() <= found[metric].mean() <= here.max() for metric, here in expected.items()}
-    cells = (_shown(values) + ("" if within[metric] else " **outside**") for metric, values in found.items())
+    within = {metric: values.min() <= measured[metric].mean() <= values.max() for metric, values in expected.items()}
+    cells = (_shown(values) + ("" if within[metric] else " **outside**") for metric, values in measured.items())
     yield _row("", f"gateway `{case.gateway}`", cells)
 
 
@@ -137,7 +139,7 @@ def _row(*cells: str | Iterable[str]) -> str:
 
 
 def _columns(runs: Sequence[dict[str, float]]) -> dict[str, FloatArray]:
-    return {name: np.array([of[name] for of in runs]) for name in runs[0]}
+    return {name: np.array([values[name] for values in runs]) for name in runs[0]}
 
 
 def _shown(values: FloatArray) -> str:
@@ -150,14 +152,14 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5, help="runs through each gateway")
     parser.add_argument("--duration", type=float, default=40.0, help="s of each run")
     parser.add_argument("--pace", type=float, default=1.0, help="simulated seconds a second, behind a gateway")
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     lines: list[str] = []
     head: list[str] = []
-    for name in given.case or CASES:
+    for name in arguments.case or CASES:
         if _head(CASES[name]) != head:
             head = _head(CASES[name])
             lines += ["", *head]
-        lines += rows(name, CASES[name], given.duration, given.seeds, given.pace)
+        lines += rows(name, CASES[name], arguments.duration, arguments.seeds, arguments.pace)
     print("\n".join(lines))
 
 

@@ -41,17 +41,18 @@ class Consumption(Observer):
         runners = [runner for process in agent_host for server in process.children() for runner in server.children()]
         if truth.tick == self.first:
             memory = [runner.memory_full_info() for runner in runners]
-            self.uss_mb = [of.uss / 1e6 for of in memory]
+            self.uss_mb = [usage.uss / 1e6 for usage in memory]
             # PSS: what some processes share counts for each by its part, so that the sum is what they take together.
             self.all_gb = (
-                sum(of.pss for of in [*memory, *(one.memory_full_info() for one in [world, *agent_host])]) / 1e9
+                sum(usage.pss for usage in [*memory, *(process.memory_full_info() for process in [world, *agent_host])])
+                / 1e9
             )
-        its_s, theirs_s, hosts_s = (sum(map(_processor_s, of)) for of in ([world], runners, agent_host))
+        world_s, theirs_s, hosts_s = (sum(map(_processor_s, processes)) for processes in ([world], runners, agent_host))
         ticks = self.last - self.first
-        self.world_ms = (its_s - self._begun_s[0]) / ticks * 1e3
+        self.world_ms = (world_s - self._begun_s[0]) / ticks * 1e3
         self.runner_us = (theirs_s - self._begun_s[1]) / ticks / len(runners) * 1e6
         self.host_ms = (hosts_s - self._begun_s[2]) / ticks * 1e3
-        self._begun_s = its_s, theirs_s, hosts_s
+        self._begun_s = world_s, theirs_s, hosts_s
 
 
 def _processor_s(process: psutil.Process) -> float:

@@ -167,6 +167,6 @@ def line_of_sight(name: str, repeats: int) -> None:
 
 def air_scaling(name: str, repeats: int) -> None:
     """How much dearer a link is in one swarm than in another of the same density."""
-    found = [scaling() for _ in range(repeats)]
-    ratios = [ratio for ratio, _ in found]
-    print_line(name, statistics.median(ratios), "dearest over cheapest", {**found[0][1], **spread(ratios)})
+    measured = [scaling() for _ in range(repeats)]
+    ratios = [ratio for ratio, _ in measured]
+    print_line(name, statistics.median(ratios), "dearest over cheapest", {**measured[0][1], **spread(ratios)})

@@ -22,9 +22,9 @@ def realtime(name: str, repeats: int, *, robots: int, runners: int, subtick_s: f
     run(scenario.model_copy(update={"duration_s": 1.0}))
     results = [run(scenario, runners=runners, realtime=1.0, subtick=subtick_s) for _ in range(repeats)]
     timings = [result.realtime for result in results if result.realtime]
-    delivery = [_ms(of.delivery) for of in timings]
-    jitter = [_ms(of.tick_jitter) for of in timings]
-    for of, values, last in (
+    delivery = [_ms(timing.delivery) for timing in timings]
+    jitter = [_ms(timing.tick_jitter) for timing in timings]
+    for row_name, values, last in (
         (name, delivery, timings[-1].delivery),
         (f"{name}-jitter", jitter, timings[-1].tick_jitter),
     ):
@@ -39,7 +39,7 @@ def realtime(name: str, repeats: int, *, robots: int, runners: int, subtick_s: f
             "load_average": round(os.getloadavg()[0], 1),  # a p99 of a millisecond is one of a quiet machine
             **spread(values),
         }
-        report(of, statistics.median(values), "ms", results[-1], config)
+        report(row_name, statistics.median(values), "ms", results[-1], config)
 
 
 def _ms(delays: LatencySummary | None) -> float:

@@ -19,7 +19,7 @@ from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.metrics.records.campaign import campaign_json
 from swarmwire.metrics.records.campaign.campaign_json import Campaign, Response
 
-LOSSES = tuple(place / 20 for place in range(10))
+LOSSES = tuple(index / 20 for index in range(10))
 COUNTS = (5, 10, 20, 40, 80)
 LIMIT_S = 600.0
 METRICS = ("order", "largest_component", "min_gap", "collisions", "target_best", "target_mean", "components")
@@ -60,8 +60,8 @@ def write_campaign(folder: Path, seeds: int) -> int:
     columns: dict[str, Any] = {"run": run, "point": point, "seed": seed, "radio.loss": loss}
     columns |= {"robots.flock.count": count.astype(np.int64), "ended": ["duration"] * len(run)}
     columns |= {"sim_time_s": np.full(len(run), LIMIT_S), "radio.link_pdr": link_pdr}
-    for place, metric in enumerate(METRICS):
-        columns[f"{metric}.final"] = (1 + place) / (1.0 + np.exp(20.0 * loss - 4.0)) + 0.1 * _drawn(run, metric)
+    for index, metric in enumerate(METRICS):
+        columns[f"{metric}.final"] = (1 + index) / (1.0 + np.exp(20.0 * loss - 4.0)) + 0.1 * _drawn(run, metric)
     for time in TIMES:
         time_s = -100.0 * (1.0 + 8.0 * loss) * (20.0 / count) ** 0.5 * np.log(1.0 - _drawn(run, time))
         columns[time] = [value if value < LIMIT_S else None for value in time_s.tolist()]
@@ -70,8 +70,8 @@ def write_campaign(folder: Path, seeds: int) -> int:
     return len(run)
 
 
-def _drawn(run: IntArray, what: str) -> FloatArray:
-    return uniform(derive_key("report-cost"), purpose(what), 0, run, 0)
+def _drawn(run: IntArray, name: str) -> FloatArray:
+    return uniform(derive_key("report-cost"), purpose(name), 0, run, 0)
 
 
 def _about(points: list[tuple[float, int]], seeds: int) -> Campaign:

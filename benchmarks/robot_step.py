@@ -26,8 +26,8 @@ def robot_step(name: str, repeats: int, *, kind: str, policy: Path | None = None
 
     The robots run the hand-written rule, or a trained policy.
     """
-    figures = [one for _ in range(repeats) for one in measured(kind, policy)]
-    step_ms, rss_mb = [of["step_ms"] for of in figures], [of["rss_mb"] for of in figures]
+    figures = [figure for _ in range(repeats) for figure in measured(kind, policy)]
+    step_ms, rss_mb = [figure["step_ms"] for figure in figures], [figure["rss_mb"] for figure in figures]
     config = {
         "driver": kind,
         "robots": ROBOTS,
@@ -36,10 +36,10 @@ def robot_step(name: str, repeats: int, *, kind: str, policy: Path | None = None
         "radio": "zenoh",
         "neighbours": ROBOTS - 1,
         "tracker": True,
-        "steps": sum(int(of["steps"]) for of in figures),
-        "step_p99_ms": round(statistics.median(of["step_p99_ms"] for of in figures), 3),
-        "process_ms_per_step": round(statistics.median(of["process_ms"] for of in figures), 3),
-        "received_per_step": round(statistics.median(of["received"] for of in figures), 2),
+        "steps": sum(int(figure["steps"]) for figure in figures),
+        "step_p99_ms": round(statistics.median(figure["step_p99_ms"] for figure in figures), 3),
+        "process_ms_per_step": round(statistics.median(figure["process_ms"] for figure in figures), 3),
+        "received_per_step": round(statistics.median(figure["received"] for figure in figures), 2),
     }
     print_line(name, statistics.median(step_ms), "ms per step", {**config, **spread(step_ms)})
     print_line(f"{name}-memory", statistics.median(rss_mb), "MB", {**config, **spread(rss_mb)})
@@ -63,14 +63,14 @@ def measured(kind: str, policy: Path | None) -> list[dict[str, float]]:
             agents = _agents(simulation, Path(folder))
             while any(agent.poll() is None for agent in agents) and simulation.tick < simulation.plan.ticks:
                 simulation.step()
-            return [_told(agent) for agent in agents]
+            return [_figures(agent) for agent in agents]
 
 
 def _agents(simulation: Simulation, folder: Path) -> "list[subprocess.Popen[str]]":
     """A process for each robot, every two of them linked."""
     assert simulation.served is not None
     robots = simulation.served.robots
-    at = [f"unixsock-stream/{folder}/{place}" for place in range(len(robots))]
+    at = [f"unixsock-stream/{folder}/{index}" for index in range(len(robots))]
     command = [sys.executable, "-m", "benchmarks.robot_step_agent"]
     start = partial(subprocess.Popen[str], stdout=subprocess.PIPE, text=True, cwd=ROOT)
     return [
@@ -80,15 +80,15 @@ def _agents(simulation: Simulation, folder: Path) -> "list[subprocess.Popen[str]
                 str(robot.file),
                 str(SECONDS),
                 'radio.kind="zenoh"',
-                f"network.listen={json.dumps([at[place]])}",
-                f"network.connect={json.dumps([*simulation.served.endpoints, *at[:place]])}",
+                f"network.listen={json.dumps([at[index]])}",
+                f"network.connect={json.dumps([*simulation.served.endpoints, *at[:index]])}",
             ]
         )
-        for place, robot in enumerate(robots)
+        for index, robot in enumerate(robots)
     ]
 
 
-def _told(agent: "subprocess.Popen[str]") -> dict[str, float]:
+def _figures(agent: "subprocess.Popen[str]") -> dict[str, float]:
     out, _ = agent.communicate(timeout=SECONDS + 30)
     if agent.returncode != 0:
         raise RuntimeError("an agent failed: the others' steps say nothing")

@@ -53,9 +53,9 @@ class MeasuredSteps:
 
 def main() -> None:
     """Run it, and print what it took as JSON, last of all."""
-    file, seconds, *given = sys.argv[1:]
+    file, seconds, *settings = sys.argv[1:]
     steps, clock = MeasuredSteps(), WallClock()
-    flags = {key: (key, json.loads(value)) for key, _, value in (text.partition("=") for text in given)}
+    flags = {key: (key, json.loads(value)) for key, _, value in (text.partition("=") for text in settings)}
     plan = robot_config(read_settings(Path(file), flags), file, clock)
     run_robot(plan, clock, StopFlag(), "measured", float(seconds))
     print(json.dumps(steps.figures() | {"rss_mb": most_memory_mb()}), flush=True)

@@ -26,14 +26,16 @@ def rows(lines: Iterable[Line]) -> list[str]:
     return head + [_row(line, pymunk.get(name)) for name, line in default.items()]
 
 
-def _row(line: Line, beside: Line | None) -> str:
+def _row(line: Line, pymunk_line: Line | None) -> str:
     name, target = line["name"], TARGETS.get(line["name"])
-    asked = f"{'≤' if target.at_most else '≥'} {_number(target.value)}" if target else ""
+    target_text = f"{'≤' if target.at_most else '≥'} {_number(target.value)}" if target else ""
     met = "" if target is None else "met" if target.met_by(line["value"]) else "**missed**"
     between = f" ({_number(line['lowest'])} to {_number(line['highest'])})" if "lowest" in line else ""
-    other = _number(beside["value"]) if beside else ""
-    what = target.what if target else ""
-    return f"| `{name}` | {asked} | {_number(line['value'])} {line['unit']}{between} | {met} | {other} | {what} |"
+    other = _number(pymunk_line["value"]) if pymunk_line else ""
+    meaning = target.meaning if target else ""
+    return (
+        f"| `{name}` | {target_text} | {_number(line['value'])} {line['unit']}{between} | {met} | {other} | {meaning} |"
+    )
 
 
 def _number(value: float) -> str:

@@ -8,7 +8,7 @@ class Target:
     """A number to reach: at least so much, or at most."""
 
     value: float
-    what: str
+    meaning: str
     at_most: bool = False
 
     def met_by(self, value: float) -> bool:
@@ -16,9 +16,9 @@ class Target:
         return value <= self.value if self.at_most else value >= self.value
 
 
-def most(value: float, what: str) -> Target:
+def most(value: float, meaning: str) -> Target:
     """A target to stay below."""
-    return Target(value, what, at_most=True)
+    return Target(value, meaning, at_most=True)
 
 
 TARGETS = {

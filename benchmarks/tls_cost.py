@@ -115,14 +115,14 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
         backends: dict[str, LockstepBackend] = {}
         for kind in KINDS:
             at: list[str] = []
-            around = BackendHooks(opened=at.extend)
+            hooks = BackendHooks(opened=at.extend)
             backend = LockstepBackend(
                 _door(kind, folder, certs, names),
                 kind,
                 Lockstep(parts, policy=JoinPolicy(open=True)),
                 START_S,
                 clock,
-                around,
+                hooks,
             )
             stack.callback(backend.close)
             backend.open()
@@ -150,10 +150,10 @@ def _measured(robots: int, ticks: int) -> tuple[FloatArray, dict[str, FloatArray
 
 def _certificates(folder: Path, names: tuple[str, ...]) -> Path:
     begin_authority(folder, WallClock())
-    here = ("127.0.0.1",)
+    addresses = ("127.0.0.1",)
     issue(
         folder,
-        [certificate_request("world", here), *(certificate_request(name, here, "runner") for name in names)],
+        [certificate_request("world", addresses), *(certificate_request(name, addresses, "runner") for name in names)],
         1,
         WallClock(),
     )

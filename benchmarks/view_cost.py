@@ -44,9 +44,9 @@ class Timed(Observer):
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Close the recording."""
         start_ns = self._clock.now_ns()
-        told = self._recording.end(last)
+        summary_part = self._recording.end(last)
         self.end_ns = self._clock.now_ns() - start_ns
-        return told
+        return summary_part
 
     def cost_percent(self) -> float:
         """The recording's share of the rest of the run, its end included: it sends in blocks, the last one there."""

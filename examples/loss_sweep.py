@@ -33,8 +33,8 @@ def main() -> None:
     options.add_argument("scenario", nargs="?", type=Path, default=FLOCK)
     options.add_argument("--seeds", type=int, default=5)
     options.add_argument("--duration", type=float, default=30.0, help="simulated seconds of each run")
-    asked = options.parse_args()
-    runs = table(asked.scenario, asked.seeds, asked.duration)
+    arguments = options.parse_args()
+    runs = table(arguments.scenario, arguments.seeds, arguments.duration)
     medians = runs.group_by("loss", maintain_order=True).agg(pl.col("link_pdr", "order").median(), runs=pl.len())
     with pl.Config(tbl_formatting="ASCII_MARKDOWN", tbl_hide_column_data_types=True, tbl_hide_dataframe_shape=True):
         print(medians)

@@ -59,13 +59,13 @@ def main(arguments: Sequence[str]) -> int:
     names: list[str] = options.only or [*SECTIONS, *([] if options.quick or options.recorded else OTHERS)]
     sections = {name: SECTIONS[name]() for name in names if name in SECTIONS}
     if options.quick:
-        sections = {name: [_quick(each) for each in found] for name, found in sections.items()}
-    every = [each for found in sections.values() for each in found]
+        sections = {name: [_quick(each) for each in configurations] for name, configurations in sections.items()}
+    every = [each for configurations in sections.values() for each in configurations]
     figures = recorded() if options.recorded else _run(every, Path(options.cache), options.processes)
-    rows = {name: _rows(name, found, figures) for name, found in sections.items()}
+    rows = {name: _rows(name, configurations, figures) for name, configurations in sections.items()}
     if options.record:
         write_record(figures)
-    tables = {name: table(found) for name, found in rows.items()}
+    tables = {name: table(section_rows) for name, section_rows in rows.items()}
     if not set(SECTIONS) - set(names):
         tables["summary"] = summary(rows)
     if "closed-forms" in names:
@@ -73,12 +73,15 @@ def main(arguments: Sequence[str]) -> int:
     if "speed" in names:
         tables["speed"] = speed(options.build)
     _show(tables, options.page)
-    return int(not options.quick and any(row.misses and row.reason is None for found in rows.values() for row in found))
+    return int(
+        not options.quick
+        and any(row.misses and row.reason is None for section_rows in rows.values() for row in section_rows)
+    )
 
 
 def _options(arguments: Sequence[str]) -> Namespace:
     described = [f"  {name:13}{_first_line(make)}" for name, make in SECTIONS.items()]
-    described += [f"  {name:13}{what}" for name, what in OTHERS.items()]
+    described += [f"  {name:13}{help_text}" for name, help_text in OTHERS.items()]
     parser = ArgumentParser(
         prog="python -m benchmarks.ns3",
         description=TEACH,
@@ -120,28 +123,28 @@ def _run(configurations: list[Configuration], cache: Path, processes: int) -> di
     """ns-3's figures of each, from the cache or from child processes: ns-3 is one simulator for a whole process."""
     cache.mkdir(parents=True, exist_ok=True)
     files = {each: cache / f"{_fingerprint(each)}.npz" for each in configurations}
-    found = {each: figures_of(each, _read(file)) for each, file in files.items() if file.exists()}
+    figures = {each: figures_of(each, _read(file)) for each, file in files.items() if file.exists()}
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     spawn = multiprocessing.get_context("spawn")
     with Progress(*columns, console=Console(stderr=True)) as progress, ProcessPoolExecutor(processes, spawn) as pool:
-        bar = progress.add_task("ns-3", total=len(files), completed=len(found))
-        begun = {pool.submit(theirs, each): each for each in files if each not in found}
+        bar = progress.add_task("ns-3", total=len(files), completed=len(figures))
+        begun = {pool.submit(theirs, each): each for each in files if each not in figures}
         try:
             for done in as_completed(begun):
                 each, received = begun[done], done.result()
                 with atomic_write(files[each]) as aside:  # a half of a file would be read in the next comparison
                     np.savez_compressed(aside, packets=received.packets, delay_ns=received.delay_ns)
-                found[each] = figures_of(each, received)
+                figures[each] = figures_of(each, received)
                 progress.update(bar, advance=1, description=f"ns-3: {' '.join(each.cells)}")
         finally:  # after Ctrl-C or an error the pool would run all that is left, for hours
             pool.shutdown(wait=False, cancel_futures=True)
-    return found
+    return figures
 
 
 def _fingerprint(configuration: Configuration) -> str:
     """Of all that ns-3 is given."""
-    given = [NETWORK.read_text(encoding="utf-8"), *map(configuration.ns3_input, range(configuration.seeds))]
-    return hashlib.sha256("\n".join(given).encode()).hexdigest()[:32]
+    inputs = [NETWORK.read_text(encoding="utf-8"), *map(configuration.ns3_input, range(configuration.seeds))]
+    return hashlib.sha256("\n".join(inputs).encode()).hexdigest()[:32]
 
 
 def _read(file: Path) -> Received:

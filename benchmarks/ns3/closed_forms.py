@@ -32,9 +32,9 @@ BEGIN, WINDOW_BITS, OCTETS = 16, 6, 512  # of Bianchi: slots of the first window
 def closed_forms() -> list[str]:
     """Lines of Markdown: what, by which source, what it states, what we have."""
     lines = ["| what | source | stated | ours | verdict |", "| --- " * 5 + "|"]
-    for what, source, stated, found, limit in [*_bit_errors(), *_airtimes(), *_aloha(), *_bianchi(), _argos()]:
-        verdict = "within" if abs(found / stated - 1.0) <= limit else "**miss**"
-        lines.append(f"| {what} | {source} | {stated:.5g} | {found:.5g} | {verdict} |")
+    for quantity, source, stated, simulated, limit in [*_bit_errors(), *_airtimes(), *_aloha(), *_bianchi(), _argos()]:
+        verdict = "within" if abs(simulated / stated - 1.0) <= limit else "**miss**"
+        lines.append(f"| {quantity} | {source} | {stated:.5g} | {simulated:.5g} | {verdict} |")
     return lines
 
 
@@ -43,12 +43,12 @@ Line = tuple[str, str, float, float, float]  # what, source, stated, ours, the l
 
 def _bit_errors() -> Iterator[Line]:
     for sinr_db, stated in ((5, 7.386009e-14), (2, 5.131392e-07), (-1, 1.148944e-03), (-4, 3.916346e-02)):
-        found = float(oqpsk_bit_errors(from_db(sinr_db)))
+        simulated = float(oqpsk_bit_errors(from_db(sinr_db)))
         yield (
             f"bit errors of 802.15.4 at {sinr_db} dB",
             "IEEE 802.15.4-2006, E.4.1.7; ns-3's test",
             stated,
-            found,
+            simulated,
             EXACT,
         )
 
@@ -100,10 +100,12 @@ def aloha(load: float, ticks: int) -> float:
 
 def _bianchi() -> Iterator[Line]:
     for nodes in (5, 10, 20):
-        one = Configuration("802.11a", 6, nodes, OCTETS, 0.005 * nodes / 20, unicast=True, is_saturated=True, seeds=4)
-        found = float(figures_of(one, ours(one))[THROUGHPUT].mean())
-        what = f"{nodes} stations of 802.11a that always send, throughput each, Mbit/s"
-        yield what, "Bianchi 2000", bianchi_mbps(nodes) / nodes, found / nodes, 2.0 * LIMIT
+        configuration = Configuration(
+            "802.11a", 6, nodes, OCTETS, 0.005 * nodes / 20, unicast=True, is_saturated=True, seeds=4
+        )
+        simulated = float(figures_of(configuration, ours(configuration))[THROUGHPUT].mean())
+        quantity = f"{nodes} stations of 802.11a that always send, throughput each, Mbit/s"
+        yield quantity, "Bianchi 2000", bianchi_mbps(nodes) / nodes, simulated / nodes, 2.0 * LIMIT
 
 
 def bianchi_mbps(stations: int) -> float:
@@ -144,8 +146,8 @@ def _argos() -> Line:
     linked = np.zeros((ROBOTS, ROBOTS), np.bool_)
     linked[received.sender_index, received.receiver] = True
     agreeing = int((linked == by_argos(xy_m, 3.0, radius_m)).sum()) - ROBOTS
-    what = f"pairs of {ROBOTS} foot-bots that hear one another or not as ARGoS's rule says"
-    return what, "ARGoS 3, rab_medium", ROBOTS * (ROBOTS - 1), agreeing, 0.0
+    quantity = f"pairs of {ROBOTS} foot-bots that hear one another or not as ARGoS's rule says"
+    return quantity, "ARGoS 3, rab_medium", ROBOTS * (ROBOTS - 1), agreeing, 0.0
 
 
 def by_argos(xy_m: np.ndarray, range_m: float, radius_m: float) -> np.ndarray:

@@ -58,7 +58,7 @@ def figures_of(configuration: Configuration, received: Received) -> Figures:
         "delivery": ratio[:, intended].mean(axis=1),
         **unicast,
         **delays,
-        **{name: _mean(ratio, of) for name, of in bins.items()},
+        **{name: _mean(ratio, pairs) for name, pairs in bins.items()},
     }
 
 
@@ -85,12 +85,12 @@ def _bins(configuration: Configuration, intended: BoolArray) -> dict[str, BoolAr
         f"{100 * near:g} to {100 * far:g}{OF_REACH}": intended & (part >= near) & (part < far)
         for near, far in pairwise(edges)
     }
-    return {name: of for name, of in bins.items() if of.sum() >= FEWEST_PAIRS}
+    return {name: pairs for name, pairs in bins.items() if pairs.sum() >= FEWEST_PAIRS}
 
 
-def _mean(ratio: FloatArray, of: BoolArray) -> FloatArray:
+def _mean(ratio: FloatArray, pairs: BoolArray) -> FloatArray:
     with np.errstate(invalid="ignore"):
-        return np.where(of, ratio, 0.0).sum(axis=(1, 2)) / of.sum(axis=(1, 2))
+        return np.where(pairs, ratio, 0.0).sum(axis=(1, 2)) / pairs.sum(axis=(1, 2))
 
 
 @dataclass(frozen=True)
@@ -144,8 +144,8 @@ class Agreement:
 
 def standard_error(values: FloatArray) -> float:
     """Of the mean of those that are numbers; 0 of a single one."""
-    known = values[np.isfinite(values)]
-    return float(known.std(ddof=1) / len(known) ** 0.5) if len(known) > 1 else 0.0
+    finite = values[np.isfinite(values)]
+    return float(finite.std(ddof=1) / len(finite) ** 0.5) if len(finite) > 1 else 0.0
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class Row:
     @property
     def misses(self) -> list[str]:
         """Names of the figures that are off limits."""
-        return [one.name for one in self.agreements if not one.is_within]
+        return [agreement.name for agreement in self.agreements if not agreement.is_within]
 
     @property
     def reason(self) -> str | None:
@@ -175,7 +175,7 @@ class Row:
 def table(rows: Iterable[Row]) -> list[str]:
     """Lines of Markdown: a row for each configuration, and the reasons of misses below."""
     rows = list(rows)
-    names = list(dict.fromkeys(one.name for row in rows for one in row.agreements))
+    names = list(dict.fromkeys(agreement.name for row in rows for agreement in row.agreements))
     main, bins = (
         [name for name in names if not name.endswith(OF_REACH)],
         [name for name in names if name.endswith(OF_REACH)],
@@ -187,11 +187,11 @@ def table(rows: Iterable[Row]) -> list[str]:
     lines = ["| " + " | ".join([*columns, "verdict"]) + " |", "| --- " * (len(columns) + 1) + "|"]
     notes: list[str] = []
     for row in rows:
-        found = {one.name: one.cells for one in row.agreements}
+        cells_by_name = {agreement.name: agreement.cells for agreement in row.agreements}
         cells = row.configuration.cells
         for name in main:
-            cells += found.get(name, ["", ""])
-        cells += [", ".join(found[name]) if name in found else "" for name in bins]
+            cells += cells_by_name.get(name, ["", ""])
+        cells += [", ".join(cells_by_name[name]) if name in cells_by_name else "" for name in bins]
         lines.append("| " + " | ".join([*cells, _verdict(row, notes)]) + " |")
     return [*lines, *(f"\n({number}) {note}" for number, note in enumerate(notes, 1))]
 
@@ -203,9 +203,14 @@ def summary(sections: Mapping[str, list[Row]]) -> list[str]:
     for name, rows in {**sections, "all": every}.items():
         cells = [name, str(len(rows)), str(sum(not row.misses for row in rows))]
         for kind in LIMITS:
-            found = [one for row in rows for one in row.agreements if one.kind == kind and one.is_comparable]
-            off = max((abs(float(one.differences.mean())) for one in found), default=None)
-            cells.append("" if off is None else f"{100 * off:.1f} %" if found[0].is_relative else f"{off:.3f}")
+            comparable = [
+                agreement
+                for row in rows
+                for agreement in row.agreements
+                if agreement.kind == kind and agreement.is_comparable
+            ]
+            off = max((abs(float(agreement.differences.mean())) for agreement in comparable), default=None)
+            cells.append("" if off is None else f"{100 * off:.1f} %" if comparable[0].is_relative else f"{off:.3f}")
         lines.append("| " + " | ".join(cells) + " |")
     return ["Rows within the limits, and the largest mean differences:", "", *lines]
 
@@ -269,9 +274,9 @@ def write_record(figures: dict[Configuration, Figures]) -> None:
     """Write figures of ns-3 as the record, a line for each configuration."""
     lines = [
         json.dumps(
-            {"configuration": each.as_mapping(), "figures": {n: _numbers(values) for n, values in found.items()}}
+            {"configuration": each.as_mapping(), "figures": {n: _numbers(values) for n, values in own_figures.items()}}
         )
-        for each, found in figures.items()
+        for each, own_figures in figures.items()
     ]
     head = json.dumps(HEAD, indent=2)[:-2]
     rows = ",\n    ".join(lines)
@@ -284,7 +289,9 @@ def _numbers(values: np.ndarray) -> list[float | None]:
 
 
 def _figures(columns: dict[str, list[float | None]]) -> Figures:
-    return {name: np.array([np.nan if one is None else one for one in values]) for name, values in columns.items()}
+    return {
+        name: np.array([np.nan if value is None else value for value in values]) for name, values in columns.items()
+    }
 
 
 def _configuration(fields: dict[str, Any]) -> Configuration:

@@ -16,7 +16,7 @@ from swarmwire.deploy.runs.scenario_parts import radio_of
 WARM_UP_S = 0.5
 LATE_S = 0.6  # after the measured time, above the 0.5 s that a packet may wait
 SPOT_M = 0.7  # side of the square in which distances do not count: below 1 m the loss is constant
-PLACE = purpose("place of validation")
+POSITION_PURPOSE = purpose("place of validation")
 EVER = 2**31 - 1
 MODES = {"802.11a": "OfdmRate{}Mbps", "802.11b": "DsssRate{}Mbps", "802.11g": "ErpOfdmRate{}Mbps"}
 # What ns-3 has by default where a preset has other values: loss at 1 m, power, no headers of IP and UDP; for 802.15.4
@@ -113,8 +113,8 @@ class Configuration:
     @property
     def counted_ns(self) -> tuple[int, int]:
         """The times of reception that count, the last one excluded."""
-        whole = 0.0, WARM_UP_S + self.measured_s + LATE_S
-        start_s, end_s = (WARM_UP_S, WARM_UP_S + self.measured_s) if self.is_saturated else whole
+        full_s = 0.0, WARM_UP_S + self.measured_s + LATE_S
+        start_s, end_s = (WARM_UP_S, WARM_UP_S + self.measured_s) if self.is_saturated else full_s
         return round(1e9 * start_s), round(1e9 * end_s)
 
     @property
@@ -134,7 +134,7 @@ class Configuration:
             return np.tile(np.array([*ends, (0.0, 0.0)]), (self.seeds, 1, 1))
         if self.places == "pairs":
             return np.tile(np.array([(x_m, 0.0) for x_m in self.size_m]), (self.seeds, 1, 1))
-        draws = uniform(self.keys[:, None, None], np.arange(self.nodes)[:, None], np.arange(2), 0, PLACE)
+        draws = uniform(self.keys[:, None, None], np.arange(self.nodes)[:, None], np.arange(2), 0, POSITION_PURPOSE)
         return self.size_m[0] * (draws - 0.5)
 
     def sent_at_ns(self) -> IntArray:
@@ -171,17 +171,17 @@ WPAN, A6, A54, B1, B11 = ("802.15.4", 0.25), ("802.11a", 6.0), ("802.11a", 54.0)
 FEW = {"seeds": 10, "measured_s": 4.0}  # few nodes: more packets for the same error
 
 
-def _of(kind: Kind, nodes: int, octets: int, interval_ms: float, **more: Any) -> Configuration:
-    given: dict[str, Any] = {"seeds": 12 if kind == WPAN else 6, **more}  # few packets in 2 s, and quickly run
-    return Configuration(*kind, nodes, octets, 1e-3 * interval_ms, **given)
+def _configuration(kind: Kind, nodes: int, octets: int, interval_ms: float, **more: Any) -> Configuration:
+    options: dict[str, Any] = {"seeds": 12 if kind == WPAN else 6, **more}  # few packets in 2 s, and quickly run
+    return Configuration(*kind, nodes, octets, 1e-3 * interval_ms, **options)
 
 
 def _line(kind: Kind, octets: int, interval_ms: float, *size_m: float, **more: Any) -> Configuration:
-    return _of(kind, len(size_m) + 1, octets, interval_ms, places="line", size_m=size_m, **{**FEW, **more})
+    return _configuration(kind, len(size_m) + 1, octets, interval_ms, places="line", size_m=size_m, **{**FEW, **more})
 
 
 def _area(kind: Kind, octets: int, interval_ms: float, side_m: float, **more: Any) -> Configuration:
-    return _of(kind, 40, octets, interval_ms, places="area", size_m=(side_m,), **more)
+    return _configuration(kind, 40, octets, interval_ms, places="area", size_m=(side_m,), **more)
 
 
 def spot() -> list[Configuration]:
@@ -190,19 +190,21 @@ def spot() -> list[Configuration]:
     wpan = [*((n, 20, 100) for n in nodes), (20, 20, 50), (20, 49, 100), (40, 49, 100)]
     fast, slow = [*((n, 128, 20) for n in nodes), (80, 128, 100)], [*((n, 128, 100) for n in nodes), (20, 128, 50)]
     rows = [*((WPAN, row) for row in wpan), *((A6, row) for row in fast), (A54, fast[3]), *((B1, row) for row in slow)]
-    return [_of(kind, *row) for kind, row in rows]
+    return [_configuration(kind, *row) for kind, row in rows]
 
 
 def overload() -> list[Configuration]:
     """More packets than there is time for: what waits too long is dropped."""
     rows = [(A6, 3, 128, 0.5), (A6, 2, 128, 0.4), (B1, 10, 128, 5), (B1, 5, 128, 2)]
-    return [_of(*row, seeds=3, measured_s=1.0) for row in rows]
+    return [_configuration(*row, seeds=3, measured_s=1.0) for row in rows]
 
 
 def distance() -> list[Configuration]:
     """One sender and one receiver: noise alone."""
     near_m = {WPAN: (95, 105, 110, 115, 120), A6: (49, 53), A54: (28, 31, 33, 35), B1: (49, 53), B11: (45, 53)}
-    return [_line(kind, 20 if kind == WPAN else 128, 10, m) for kind, found in near_m.items() for m in found]
+    return [
+        _line(kind, 20 if kind == WPAN else 128, 10, m) for kind, distances_m in near_m.items() for m in distances_m
+    ]
 
 
 def hidden() -> list[Configuration]:
@@ -222,7 +224,10 @@ def saturation() -> list[Configuration]:
     """Queues that are never empty: throughput."""
     rows = [(A6, 5, 2.5), (A6, 10, 5), (A6, 20, 5), (B1, 5, 20), (B1, 10, 40), (B1, 20, 40)]
     more: dict[str, Any] = {"is_saturated": True, "seeds": 4}
-    return [_of(kind, nodes, 512, ms, unicast=to, **more) for to, (kind, nodes, ms) in product((False, True), rows)]
+    return [
+        _configuration(kind, nodes, 512, ms, unicast=to, **more)
+        for to, (kind, nodes, ms) in product((False, True), rows)
+    ]
 
 
 def unicast() -> list[Configuration]:
@@ -233,7 +238,7 @@ def unicast() -> list[Configuration]:
     areas = [(WPAN, 20, 200, 80), (A6, 128, 50, 40), (A6, 128, 50, 80), (B1, 128, 200, 40), (B1, 128, 200, 60)]
     mixed = [((A6, 128, 50, 80), 12), ((B1, 128, 200, 60), 32)]
     return [
-        *(_of(*row, unicast=True) for row in rows),
+        *(_configuration(*row, unicast=True) for row in rows),
         *(_line(*row, unicast=True) for row in weak),
         *(_area(*row, unicast=True, seeds=12) for row in areas),
         *(_area(*row, unicast=True, is_mixed=True, seeds=seeds) for row, seeds in mixed),
@@ -243,8 +248,13 @@ def unicast() -> list[Configuration]:
 def exposed() -> list[Configuration]:
     """Two pairs of which one sender hears the other, but not its receiver: only the NAV protects acknowledgements."""
     more: dict[str, Any] = {"places": "pairs", "size_m": (0.0, -20.0, 40.0, -60.0), "unicast": True, **FEW}
-    full = _of(A6, 4, 128, 0.5, **{**more, "is_saturated": True, "seeds": 4})
-    return [_of(B1, 4, 128, 5, **more), _of(B11, 4, 128, 2, **more), _of(A6, 4, 128, 2, **more), full]
+    full = _configuration(A6, 4, 128, 0.5, **{**more, "is_saturated": True, "seeds": 4})
+    return [
+        _configuration(B1, 4, 128, 5, **more),
+        _configuration(B11, 4, 128, 2, **more),
+        _configuration(A6, 4, 128, 2, **more),
+        full,
+    ]
 
 
 def rates() -> list[Configuration]:
@@ -255,5 +265,5 @@ def rates() -> list[Configuration]:
 
 
 BETWEEN_M = ((40, 40), (30, 45))
-MADE = (spot, overload, distance, hidden, area, saturation, unicast, exposed, rates)
-SECTIONS = {made.__name__: made for made in MADE}
+BUILDERS = (spot, overload, distance, hidden, area, saturation, unicast, exposed, rates)
+SECTIONS = {build.__name__: build for build in BUILDERS}

@@ -38,20 +38,24 @@ def speed(build: Path | None) -> list[str]:
 
 
 def _speed(program: Path | None) -> list[str]:
-    found: dict[tuple[str, bool], list[float]] = {}
+    factors_by_case: dict[tuple[str, bool], list[float]] = {}
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         for _ in range(ROUNDS):
             for moving in (False, True):
-                given = _input(moving)
-                found.setdefault(("ours", moving), []).append(ours_factor(moving))
-                found.setdefault(("ns-3's wheel", moving), []).append(_factor(pool.submit(in_wheel, given).result()))
+                nodes_text = _input(moving)
+                factors_by_case.setdefault(("ours", moving), []).append(ours_factor(moving))
+                factors_by_case.setdefault(("ns-3's wheel", moving), []).append(
+                    _factor(pool.submit(in_wheel, nodes_text).result())
+                )
                 if program is not None:
-                    answer = subprocess.run([program], input=given, capture_output=True, text=True, check=True).stdout
-                    found.setdefault(("ns-3's build", moving), []).append(_factor(answer))
+                    answer = subprocess.run(
+                        [program], input=nodes_text, capture_output=True, text=True, check=True
+                    ).stdout
+                    factors_by_case.setdefault(("ns-3's build", moving), []).append(_factor(answer))
     lines = ["| simulator | robots | x real time (lowest to highest of three) | ours over it |", "| --- " * 4 + "|"]
-    for (name, moving), factors in found.items():
+    for (name, moving), factors in factors_by_case.items():
         middle = statistics.median(factors)
-        ratio = statistics.median(found["ours", moving]) / middle
+        ratio = statistics.median(factors_by_case["ours", moving]) / middle
         robots = "moving, with the radio graph" if moving and name == "ours" else "moving" if moving else "standing"
         lines.append(f"| {name} | {robots} | {middle:.3g} ({min(factors):.3g} to {max(factors):.3g}) | {ratio:.3g} |")
     return [*lines, "", f"Measured on {cpu()}."]

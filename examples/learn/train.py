@@ -25,7 +25,7 @@ from swarmwire.agent.policy_io import PolicyLayout
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.deploy.learn import ArenaState, Choice, vector_env
 
-HERE = Path(__file__).parent
+FOLDER = Path(__file__).parent
 TICK_S = 0.1
 SPEED_MPS = 0.1  # as the hand-written rules
 NEAR_M = 0.2  # between centres
@@ -48,18 +48,18 @@ HIDDEN = 32  # units in each of two layers
 
 def crowding(state: ArenaState) -> FloatArray:
     """By how much others are nearer than `NEAR_M` to each robot, summed, (arenas, robots)."""
-    place = state.pose[:, :, :2]
-    apart_m = np.linalg.norm(place[:, :, None] - place[:, None], axis=3)
+    position = state.pose[:, :, :2]
+    apart_m = np.linalg.norm(position[:, :, None] - position[:, None], axis=3)
     return np.maximum(1.0 - apart_m / NEAR_M, 0.0).sum(axis=2) - 1.0  # each is at 0 m from itself
 
 
 def flocking_reward(state: ArenaState) -> FloatArray:
     """Aligned with the others, ahead, near the centre of all, not crowded: (arenas, robots)."""
-    place, heading = state.pose[:, :, :2], state.pose[:, :, 2]
+    position, heading = state.pose[:, :, :2], state.pose[:, :, 2]
     unit = np.stack([np.cos(heading), np.sin(heading)], axis=2)
     others = (unit.sum(axis=1, keepdims=True) - unit) / (unit.shape[1] - 1)
     ahead = state.command[:, :, 0] / SPEED_MPS
-    from_centre_m = np.linalg.norm(place - place.mean(axis=1, keepdims=True), axis=2)
+    from_centre_m = np.linalg.norm(position - position.mean(axis=1, keepdims=True), axis=2)
     away = np.clip(from_centre_m - 0.5, 0.0, 1.5)
     return (unit * others).sum(axis=2) + 0.5 * ahead - 2.0 * away - crowding(state)
 
@@ -146,7 +146,7 @@ def train(task: Task, losses: list[float], seed: int, updates: int) -> tuple[nn.
     torch.set_num_threads(1)
     torch.manual_seed(seed)
     envs = vector_env(
-        HERE / task.scenario,
+        FOLDER / task.scenario,
         arenas=ARENAS,
         seed=seed * 1_000_000,  # far from those of evaluations
         reward=task.reward,
@@ -159,8 +159,12 @@ def train(task: Task, losses: list[float], seed: int, updates: int) -> tuple[nn.
     layout = next(iter(envs.layouts.values()))
     numbers, actions, robots = len(layout.observation), len(layout.action), envs.reset()[0].shape[1]
     rows = ARENAS * robots
-    of_random = [envs.step(torch.rand(ARENAS, robots, actions).mul(2.0).sub(1.0).numpy())[0] for _ in range(ROLLOUT)]
-    scaling = Scaling(torch.from_numpy(np.concatenate(of_random)).flatten(0, 1), layout.observation, task.unseen)
+    random_observations = [
+        envs.step(torch.rand(ARENAS, robots, actions).mul(2.0).sub(1.0).numpy())[0] for _ in range(ROLLOUT)
+    ]
+    scaling = Scaling(
+        torch.from_numpy(np.concatenate(random_observations)).flatten(0, 1), layout.observation, task.unseen
+    )
     model = ActorCritic(scaling, numbers, actions)
     optimiser = torch.optim.Adam(model.parameters(), lr=LEARNING_RATE, eps=1e-5)
     seen, action = torch.zeros(ROLLOUT + 1, rows, numbers), torch.zeros(ROLLOUT, rows, actions)
@@ -186,12 +190,12 @@ def train(task: Task, losses: list[float], seed: int, updates: int) -> tuple[nn.
                 error = reward[step] + task.discount * value[step + 1] - value[step]
                 advantage[step] = ahead = error + task.discount * LAMBDA * ahead
         steps += ROLLOUT
-        of_rollout = seen[:-1], action, logprob, advantage, advantage + value[:-1]
-        flat = [of.flatten(0, 1) for of in of_rollout]
+        rollout = seen[:-1], action, logprob, advantage, advantage + value[:-1]
+        flat = [part.flatten(0, 1) for part in rollout]
         for _ in range(EPOCHS):
             for chosen in torch.randperm(ROLLOUT * rows).chunk(BATCHES):
                 optimiser.zero_grad()
-                loss_of(model, *(of[chosen] for of in flat)).backward()
+                policy_loss(model, *(part[chosen] for part in flat)).backward()
                 nn.utils.clip_grad_norm_(model.parameters(), MAX_GRADIENT)
                 optimiser.step()
         means.append(float(reward.mean()))
@@ -200,7 +204,7 @@ def train(task: Task, losses: list[float], seed: int, updates: int) -> tuple[nn.
     return model.actor, layout
 
 
-def loss_of(
+def policy_loss(
     model: ActorCritic,
     seen: torch.Tensor,
     action: torch.Tensor,
@@ -234,11 +238,11 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--updates", type=int, help="of the network, each after 5 s in 64 arenas (default: the task's)")
     parser.add_argument("--out", type=Path, required=True, help="the policy's file, .onnx")
-    given = parser.parse_args()
-    task = TASKS[given.task]
-    actor, layout = train(task, given.loss, given.seed, given.updates or task.updates)
-    save_policy(given.out, exported(actor, len(layout.observation)), layout)
-    print(f"written: {given.out}")
+    arguments = parser.parse_args()
+    task = TASKS[arguments.task]
+    actor, layout = train(task, arguments.loss, arguments.seed, arguments.updates or task.updates)
+    save_policy(arguments.out, exported(actor, len(layout.observation)), layout)
+    print(f"written: {arguments.out}")
 
 
 if __name__ == "__main__":

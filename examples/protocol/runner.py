@@ -64,9 +64,9 @@ def neighbours(arrays: dict[str, Any], measures: list[str]) -> dict[int, list[Ne
     received: dict[int, list[Neighbour]] = {}
     if "received/numbers" in arrays:
         count = arrays["received/numbers"][1][1]
-        numbers, given = unpacked(arrays["received/numbers"]), unpacked(arrays["received/given"])
+        numbers, measured = unpacked(arrays["received/numbers"]), unpacked(arrays["received/given"])
         data, offset = arrays["received/data"][2], unpacked(arrays["received/offset"])
-        range_m, bearing_rad = (given[measures.index(name) * count :] for name in ("range_m", "bearing_rad"))
+        range_m, bearing_rad = (measured[measures.index(name) * count :] for name in ("range_m", "bearing_rad"))
         for at, payload in enumerate(numbers[4 * count :]):
             message = data[offset[payload] : offset[payload + 1]]
             if len(message) == 6 and int.from_bytes(message[:2], "little") == TAG:
@@ -82,11 +82,14 @@ def acted(arrays: dict[str, Any], assignment: dict[str, Any]) -> dict[str, Any]:
     commands: list[list[float]] = []
     messages = b""
     for group in assignment["groups"]:
-        of = f"readings/{group['name']}"
-        if f"{of}/rows" in arrays:  # else the group does not act in this tick
+        prefix = f"readings/{group['name']}"
+        if f"{prefix}/rows" in arrays:  # else the group does not act in this tick
             angles = [math.radians(angle) for angle in group["body"]["sensors"]["proximity"]["angles_deg"]]
-            headings, values = unpacked(arrays[f"{of}/compass.heading_rad"]), unpacked(arrays[f"{of}/proximity.value"])
-            for at, row in enumerate(unpacked(arrays[f"{of}/rows"])):
+            headings, values = (
+                unpacked(arrays[f"{prefix}/compass.heading_rad"]),
+                unpacked(arrays[f"{prefix}/proximity.value"]),
+            )
+            for at, row in enumerate(unpacked(arrays[f"{prefix}/rows"])):
                 rays = values[at * len(angles) : (at + 1) * len(angles)]
                 commands.append([1.0, *steer(headings[at], angles, rays, received.get(row, ())), 0.0])
                 messages += struct.pack("<Hf", TAG, headings[at])
@@ -101,13 +104,18 @@ def acted(arrays: dict[str, Any], assignment: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def opened(given: argparse.Namespace) -> zenoh.Session:
+def opened(arguments: argparse.Namespace) -> zenoh.Session:
     """A client of the endpoint, and of nobody else."""
-    off, own = {"enabled": False}, {"connect_certificate": given.certificate, "connect_private_key": given.key}
-    config: dict[str, Any] = {"mode": "client", "connect": {"endpoints": [given.endpoint], "timeout_ms": 10000}}
+    off, certificate = (
+        {"enabled": False},
+        {"connect_certificate": arguments.certificate, "connect_private_key": arguments.key},
+    )
+    config: dict[str, Any] = {"mode": "client", "connect": {"endpoints": [arguments.endpoint], "timeout_ms": 10000}}
     config["scouting"] = {"multicast": off, "gossip": off}
-    if given.ca:
-        config["transport"] = {"link": {"tls": {"root_ca_certificate": given.ca, "enable_mtls": True, **own}}}
+    if arguments.ca:
+        config["transport"] = {
+            "link": {"tls": {"root_ca_certificate": arguments.ca, "enable_mtls": True, **certificate}}
+        }
     return zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
 
 
@@ -127,11 +135,11 @@ def play(session: zenoh.Session, root: str, name: str, robots: int | None) -> No
     assignment = msgpack.unpackb(reply.ok.payload.to_bytes())
     answers.put(frame("ready", -1, {}, {}))
     while (sample := arrived.get()).kind == zenoh.SampleKind.PUT:  # else the world's token, and the world, is gone
-        told = msgpack.unpackb(sample.payload.to_bytes())
-        if told["kind"] == "end":
+        message = msgpack.unpackb(sample.payload.to_bytes())
+        if message["kind"] == "end":
             break
         try:
-            answers.put(frame("actions", told["tick"], acted(told["arrays"], assignment), {}))
+            answers.put(frame("actions", message["tick"], acted(message["arrays"], assignment), {}))
         except Exception:  # whatever it is, the world is told before it is raised
             answers.put(frame("failed", -1, {}, {"robots": name, "traceback": traceback.format_exc()}))
             raise
