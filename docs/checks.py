@@ -125,7 +125,7 @@ def experiment_pages() -> Problems:
 
 def _experiment(experiment: Experiment, places: Places, draw: str) -> Problems:
     page = places.pages / f"{experiment.name}.md"
-    files = page_files(page, experiment.told(digests(experiment, places)))
+    files = page_files(page, experiment.numbers(digests(experiment, places)))
     if any(not file.exists() or file.read_text(encoding="utf-8") != text for file, text in files.items()):
         yield f"{page.relative_to(ROOT)}: its numbers are not those of its data: {draw}"
     yield from _figure(experiment, places, draw)

@@ -41,41 +41,50 @@ KEYS = ("key", "unit", "value", "default", "meaning")
 
 def rows_of(kind: str, *columns: str) -> str:
     """A row for each entry of a kind: its name, its help, then the facts of these titles."""
-    rows = [(code(of.name), sentence(of.help), *(_fact(of, title) for title in columns)) for of in entries(kind)]
+    rows = [
+        (code(entry.name), sentence(entry.help), *(_fact(entry, title) for title in columns)) for entry in entries(kind)
+    ]
     return table((kind_named(kind).singular, "meaning", *columns), rows)
 
 
-def _fact(of: CatalogueEntry, title: str) -> str:
+def _fact(entry: CatalogueEntry, title: str) -> str:
     """A fact of an entry; of its kind only the name, which the page explains."""
-    fact = ({of.mark: "yes"} | dict(of.facts)).get(title, "")
+    fact = ({entry.mark: "yes"} | dict(entry.facts)).get(title, "")
     return fact.partition(":")[0] if title == "kind" else fact
 
 
 def facts_of(kind: str, title: str) -> str:
     """A list with one fact of each entry of a kind, such as its source."""
-    return "".join(f"- {code(of.name)}: {dict(of.facts)[title]}\n" for of in entries(kind))
+    return "".join(f"- {code(entry.name)}: {dict(entry.facts)[title]}\n" for entry in entries(kind))
 
 
 def details_of(kind: str) -> str:
     """Each entry of a kind under its name: its text, and the tables of its parameters; each table once."""
     seen: set[str] = set()
     parts: list[str] = []
-    for of in entries(kind):
-        settings = [_setting(text) for _, text in of.facts if SETTING.fullmatch(text)]
-        parts += [f"### {code(of.name)}\n", *(f"{text}\n" for text in settings), f"{text_of(of)}\n", *_tables(of, seen)]
+    for entry in entries(kind):
+        settings = [_setting(text) for _, text in entry.facts if SETTING.fullmatch(text)]
+        parts += [
+            f"### {code(entry.name)}\n",
+            *(f"{text}\n" for text in settings),
+            f"{text_of(entry)}\n",
+            *_tables(entry, seen),
+        ]
     return "\n".join(parts)
 
 
 def event_tables() -> str:
     """The keys that events share, then each event with its own keys."""
-    keys = {of.name: {key.name: key for each in of.tables for key in each.parameters} for of in entries("events")}
+    keys = {
+        entry.name: {key.name: key for each in entry.tables for key in each.parameters} for entry in entries("events")
+    }
     shared = {"at_s": keys["kill"]["at_s"], "for_s": keys["kill"]["for_s"]}
-    without = [code(name) for name, own in keys.items() if "for_s" not in own]
+    without = [code(name) for name, event_keys in keys.items() if "for_s" not in event_keys]
     parts = [key_table(shared.values()), f"{' and '.join(without).capitalize()} have no `for_s`.\n"]
     seen: set[str] = set()
-    for of in entries("events"):
-        own = [key for key in keys[of.name].values() if key.name not in (*shared, "do")]
-        parts += [f"### {code(of.name)}\n", f"{text_of(of)}\n", *_by_table(own, seen, "")]
+    for entry in entries("events"):
+        own_keys = [key for key in keys[entry.name].values() if key.name not in (*shared, "do")]
+        parts += [f"### {code(entry.name)}\n", f"{text_of(entry)}\n", *_by_table(own_keys, seen, "")]
     return "\n".join(parts)
 
 
@@ -87,25 +96,27 @@ def _setting(text: str) -> str:
 def keys_of(path: str = "") -> str:
     """The keys of a scenario's table, and after them those of each table within; without a path those before any."""
     if not path:
-        tables = {of.name.partition(".")[0] for of in entries("keys") if "." in of.name}
-        return key_table(of.parameters()[0] for of in entries("keys") if of.name not in tables and "." not in of.name)
-    found = {of.name: of for of in (*entries("keys"), *entries("radio"))}
-    return "\n".join(_tables(found.get(f"{path}.*", found[path]), set(), f"{path}."))
+        tables = {entry.name.partition(".")[0] for entry in entries("keys") if "." in entry.name}
+        return key_table(
+            entry.parameters()[0] for entry in entries("keys") if entry.name not in tables and "." not in entry.name
+        )
+    entries_by_name = {entry.name: entry for entry in (*entries("keys"), *entries("radio"))}
+    return "\n".join(_tables(entries_by_name.get(f"{path}.*", entries_by_name[path]), set(), f"{path}."))
 
 
 def behaviour_table() -> str:
     """A row for each behaviour, with a link to its section."""
     rows = [
-        (_link_to_behaviour(of.name), sentence(of.help), _by_radio(of), dict(of.facts)["needs"])
-        for of in entries("behaviours")
+        (_link_to_behaviour(entry.name), sentence(entry.help), _by_radio(entry), dict(entry.facts)["needs"])
+        for entry in entries("behaviours")
     ]
     return table(("behaviour", "what it does", "by radio", "needs"), rows)
 
 
 def behaviour_details(name: str) -> str:
     """One behaviour: its needs, docstring and parameters."""
-    of = next(of for of in entries("behaviours") if of.name == name)
-    return "\n".join([f"Needs: {dict(of.facts)['needs']}\n", text_of(of), "", *_tables(of, set())])
+    entry = next(entry for entry in entries("behaviours") if entry.name == name)
+    return "\n".join([f"Needs: {dict(entry.facts)['needs']}\n", text_of(entry), "", *_tables(entry, set())])
 
 
 def _link_to_behaviour(name: str) -> str:
@@ -118,8 +129,8 @@ def _snake(name: str) -> str:
     return re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
-def _by_radio(of: CatalogueEntry) -> str:
-    scenario = SCENARIOS / f"{_snake(of.name)}.toml"
+def _by_radio(entry: CatalogueEntry) -> str:
+    scenario = SCENARIOS / f"{_snake(entry.name)}.toml"
     return "yes" if "radio" in tomllib.loads(scenario.read_text(encoding="utf-8")) else "no"
 
 
@@ -128,11 +139,11 @@ def body_table() -> str:
     bodies, units = entries("bodies"), dict[str, str]()
     sheets, sensors = dict[str, dict[str, str]](), dict[str, list[str]]()
     for body in bodies:
-        figures = {path: of for path, of in _figures(body).items() if of.value not in (None, _defaults().get(path))}
-        units |= {path: of.unit for path, of in figures.items()}
+        figures = {path: key for path, key in _figures(body).items() if key.value not in (None, _defaults().get(path))}
+        units |= {path: key.unit for path, key in figures.items()}
         speeds = {title: text for title, text in body.facts if title.startswith("fastest")}
-        sheets[body.name] = speeds | {path: _figure(of.value) for path, of in figures.items()}
-        for fitted in (of.title.removeprefix("sensor: ") for of in body.tables if "sensor: " in of.title):
+        sheets[body.name] = speeds | {path: _figure(key.value) for path, key in figures.items()}
+        for fitted in (group.title.removeprefix("sensor: ") for group in body.tables if "sensor: " in group.title):
             sensors.setdefault(fitted, []).append(code(body.name))
     parts: dict[str, dict[str, None]] = {}
     for path in (path for sheet in sheets.values() for path in sheet):
@@ -161,25 +172,27 @@ def _part_table(part: str, paths: list[str], units: dict[str, str], sheets: dict
 
 def _figures(body: CatalogueEntry) -> dict[str, CatalogueParameter]:
     """The parameters of a body by their path in its sheet."""
-    sheets = [of for of in body.tables if not of.title.startswith("reading: ")]
-    prefixes = {of.title: of.title.replace("sensor: ", "sensors.").replace("geometry", "") for of in sheets}
-    return {f"{prefixes[of.title]}.{key.name}".strip("."): key for of in sheets for key in of.parameters}
+    sheets = [group for group in body.tables if not group.title.startswith("reading: ")]
+    prefixes = {group.title: group.title.replace("sensor: ", "sensors.").replace("geometry", "") for group in sheets}
+    return {f"{prefixes[group.title]}.{key.name}".strip("."): key for group in sheets for key in group.parameters}
 
 
 @cache
 def _defaults() -> dict[str, Any]:
     """The defaults of sheets' keys by their path."""
-    sheets = {of.name: [of] for of in entries("body-keys")} | {"drive": entries("drives")}
-    sheets |= {f"sensors.{of.name}": [of] for of in entries("sensors")}
-    found = {
+    sheets = {entry.name: [entry] for entry in entries("body-keys")} | {"drive": entries("drives")}
+    sheets |= {f"sensors.{entry.name}": [entry] for entry in entries("sensors")}
+    defaults = {
         f"{prefix}.{key.name}": key.value
         for prefix, held in sheets.items()
-        for of in held
-        for each in of.tables
+        for entry in held
+        for each in entry.tables
         if each.title != "reading"
         for key in each.parameters
     }
-    return found | {of.name: of.parameters()[0].value for of in entries("body-keys") if of.name not in SHEET_TABLES}
+    return defaults | {
+        entry.name: entry.parameters()[0].value for entry in entries("body-keys") if entry.name not in SHEET_TABLES
+    }
 
 
 def _figure(value: Any) -> str:
@@ -198,9 +211,9 @@ def _figure(value: Any) -> str:
 def reading_table() -> str:
     """The fields of each sensor's readings, and the values that its class derives from them."""
     rows = [
-        (code(of.name), code(key.name), key.expected, key.unit, sentence(key.help), toml(key.value))
-        for of in entries("sensors")
-        for readings in of.tables
+        (code(entry.name), code(key.name), key.expected, key.unit, sentence(key.help), toml(key.value))
+        for entry in entries("sensors")
+        for readings in entry.tables
         if readings.title == "reading"
         for key in readings.parameters
     ]
@@ -210,16 +223,16 @@ def reading_table() -> str:
 def sensor_tables() -> str:
     """The keys that all sensors of a body share; then every sensor, its text, and its own keys in a data sheet."""
     sheets = {
-        of: [key for each in of.tables if each.title == "data sheet" for key in each.parameters]
-        for of in entries("sensors")
-        if any(each.title == "reading" for each in of.tables)
+        entry: [key for each in entry.tables if each.title == "data sheet" for key in each.parameters]
+        for entry in entries("sensors")
+        if any(each.title == "reading" for each in entry.tables)
     }
     shared = [key for key in next(iter(sheets.values())) if all(key in keys for keys in sheets.values())]
     parts = ["Keys of every sensor:\n", key_table(shared)]
-    for of, keys in sheets.items():
-        own = [key for key in keys if key not in shared]
-        parts.append(f"{code(f'[sensors.{of.name}]')}: {text_of(of)}\n")
-        parts += _by_table(own, set(), "") if own else ["It has no keys of its own.\n"]
+    for entry, keys in sheets.items():
+        own_keys = [key for key in keys if key not in shared]
+        parts.append(f"{code(f'[sensors.{entry.name}]')}: {text_of(entry)}\n")
+        parts += _by_table(own_keys, set(), "") if own_keys else ["It has no keys of its own.\n"]
     return "\n".join(parts)
 
 
@@ -227,14 +240,18 @@ def command_tables() -> str:
     """Every command: what it does, how it is called, and its options."""
     parts: list[str] = []
     for name, command in _commands(get_command(app)):
-        arguments = [_option(of) for of in command.params if of.param_type_name == "argument"]
+        arguments = [_option(parameter) for parameter in command.params if parameter.param_type_name == "argument"]
         options = ["[OPTIONS]"] if len(arguments) < len(command.params) else []
         call = " ".join(["swarmwire", name, *arguments, *options])
         parts.append(f"## {code(name)}\n\n{code(call)}\n\n{_help_text(command.help)}\n")
         rows = [
-            (code(_option(of)), _default(of.default or None, of.required), sentence(of.help or ""))
-            for of in command.params
-            if not getattr(of, "hidden", False)
+            (
+                code(_option(parameter)),
+                _default(parameter.default or None, parameter.required),
+                sentence(parameter.help or ""),
+            )
+            for parameter in command.params
+            if not getattr(parameter, "hidden", False)
         ]
         parts += [table(("argument or option", "default", "meaning"), rows)] if rows else []
     return "\n".join(parts)
@@ -243,7 +260,9 @@ def command_tables() -> str:
 def _help_text(text: str) -> str:
     """Help of a command, whose indented paragraphs are examples, as Markdown."""
     paragraphs = text.split("\n\n")
-    return "\n\n".join(f"```text\n{dedent(of)}\n```" if of.startswith("  ") else of for of in paragraphs)
+    return "\n\n".join(
+        f"```text\n{dedent(paragraph)}\n```" if paragraph.startswith("  ") else paragraph for paragraph in paragraphs
+    )
 
 
 def _commands(group: Any, within: str = "") -> Iterator[tuple[str, Any]]:
@@ -255,12 +274,12 @@ def _commands(group: Any, within: str = "") -> Iterator[tuple[str, Any]]:
             yield f"{within}{name}", command
 
 
-def _option(of: Any) -> str:
+def _option(parameter: Any) -> str:
     """How it is written on the command line."""
-    if of.param_type_name == "argument":
-        return of.metavar or of.name.upper()
-    value = "" if of.is_flag else f" {of.metavar or of.name.upper()}"
-    return ", ".join(of.opts) + value
+    if parameter.param_type_name == "argument":
+        return parameter.metavar or parameter.name.upper()
+    value = "" if parameter.is_flag else f" {parameter.metavar or parameter.name.upper()}"
+    return ", ".join(parameter.opts) + value
 
 
 def entries(kind: str) -> list[CatalogueEntry]:
@@ -268,14 +287,14 @@ def entries(kind: str) -> list[CatalogueEntry]:
     return kind_named(kind).entries()
 
 
-def text_of(of: CatalogueEntry) -> str:
+def text_of(entry: CatalogueEntry) -> str:
     """What an entry says before its figures."""
-    return of.text or sentence(of.help)
+    return entry.text or sentence(entry.help)
 
 
-def _tables(of: CatalogueEntry, seen: set[str], prefix: str = "") -> list[str]:
+def _tables(entry: CatalogueEntry, seen: set[str], prefix: str = "") -> list[str]:
     """The tables of an entry's parameters, one for each table of keys, unless `seen` has it already."""
-    return [part for each in of.tables for part in _by_table(each.parameters, seen, prefix)]
+    return [part for each in entry.tables for part in _by_table(each.parameters, seen, prefix)]
 
 
 def _by_table(parameters: Iterable[CatalogueParameter], seen: set[str], prefix: str) -> Iterator[str]:
@@ -290,30 +309,39 @@ def _by_table(parameters: Iterable[CatalogueParameter], seen: set[str], prefix: 
         if name and shown in seen:
             continue
         seen.add(shown)
-        if of := held.get(name) or held.get(name.removesuffix(".*")):
-            yield f"{code(prefix + name.removesuffix('.*'))}: {of.text or sentence(of.help)}\n"
+        if table_key := held.get(name) or held.get(name.removesuffix(".*")):
+            yield f"{code(prefix + name.removesuffix('.*'))}: {table_key.text or sentence(table_key.help)}\n"
         yield shown
-        deeper = tuple(f"{name}.{of.name}".strip(".") for of in keys if of.text)
-        yield from (f"{held[path].text}\n" for path in deeper if not any(of.startswith(path) for of in rows))
+        deeper = tuple(f"{name}.{key.name}".strip(".") for key in keys if key.text)
+        yield from (
+            f"{held[path].text}\n" for path in deeper if not any(row_name.startswith(path) for row_name in rows)
+        )
 
 
 def key_table(keys: Iterable[CatalogueParameter]) -> str:
     """A row for each parameter."""
-    rows = [(code(of.name), of.unit, _expected(of), _default(of.value, of.required), sentence(of.help)) for of in keys]
+    rows = [
+        (code(key.name), key.unit, _expected(key), _default(key.value, key.required), sentence(key.help))
+        for key in keys
+    ]
     return table(KEYS, rows)
 
 
-def body_key_table(of_table: str = "") -> str:
+def body_key_table(sheet_table: str = "") -> str:
     """The keys of this table of a body's sheet; empty: those before the first table."""
-    names = [of_table] if of_table else [of.name for of in entries("body-keys") if of.name not in SHEET_TABLES]
-    return key_table(key for of in entries("body-keys") if of.name in names for key in of.parameters())
+    names = (
+        [sheet_table]
+        if sheet_table
+        else [entry.name for entry in entries("body-keys") if entry.name not in SHEET_TABLES]
+    )
+    return key_table(key for entry in entries("body-keys") if entry.name in names for key in entry.parameters())
 
 
-def _expected(of: CatalogueParameter) -> str:
+def _expected(key: CatalogueParameter) -> str:
     """Accepted values of a key: ranges in symbols, texts to choose from as TOML has them."""
-    if found := CHOICES.fullmatch(of.expected):
-        return f"one of {', '.join(code(toml(choice)) for choice in found[1].split(', '))}"
-    expected = of.expected
+    if choices := CHOICES.fullmatch(key.expected):
+        return f"one of {', '.join(code(toml(choice)) for choice in choices[1].split(', '))}"
+    expected = key.expected
     for words, symbols in RANGES.items():
         expected = re.sub(words, symbols, expected)
     return expected

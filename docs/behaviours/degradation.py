@@ -68,7 +68,7 @@ class _Degradation:
         plain_legend(axes, loc="upper center", ncols=len(lines), columnspacing=1.2)
         return figure
 
-    def told(self, runs: Mapping[str, pl.DataFrame]) -> str:
+    def numbers(self, runs: Mapping[str, pl.DataFrame]) -> str:
         """A row for each loss, a column for each latency."""
         frame = runs[self.name]
         latencies = _levels(frame, LATENCY)

@@ -32,10 +32,10 @@ def list_command() -> None:
 
 @app.command("draw")
 def draw_command(
-    asked: Annotated[list[str] | None, typer.Argument(help="Experiments; all without.", metavar="NAME…")] = None,
+    chosen: Annotated[list[str] | None, typer.Argument(help="Experiments; all without.", metavar="NAME…")] = None,
 ) -> None:
     """Draw NAME.svg from the digests that are there, and put the numbers into NAME.md."""
-    for name in asked or names(HERE):
+    for name in chosen or names(HERE):
         experiment = find_experiment(name, HERE)
         echo(draw(experiment, HERE))
         echo(f"drawn: {HERE.figure_of(experiment.name)}")

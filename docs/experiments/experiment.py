@@ -3,7 +3,7 @@
 CAMPAIGNS = ("vicsek", "dense")      campaign files, and what their digests are called
 COLUMNS = ("order.mean",)            responses that the digests keep
 def draw(runs): ...                  from digests by campaign to a matplotlib figure
-def told(runs): ...                  to Markdown: tables of the numbers that the page cites
+def numbers(runs): ...               to Markdown: tables of the numbers that the page cites
 def digested(folder, runs): ...      where a choice of columns is not enough: from a campaign's folder and table
 """
 
@@ -20,7 +20,7 @@ from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
 
 ROOT = Path(__file__).parents[2]
-NEEDED = ("CAMPAIGNS", "COLUMNS", "draw", "told")
+NEEDED = ("CAMPAIGNS", "COLUMNS", "draw", "numbers")
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,9 @@ class Experiment:
         """The matplotlib figure."""
         return self.module.draw(runs)
 
-    def told(self, runs: Mapping[str, pl.DataFrame]) -> str:
+    def numbers(self, runs: Mapping[str, pl.DataFrame]) -> str:
         """The numbers, as Markdown."""
-        return str(self.module.told(runs)).strip()
+        return str(self.module.numbers(runs)).strip()
 
     def digested(self, folder: Path, runs: pl.DataFrame) -> pl.DataFrame | None:
         """Its own digest of a campaign; None: it is content with a choice of columns."""
@@ -84,15 +84,15 @@ def names(places: Places) -> tuple[str, ...]:
 
 def find_experiment(name: str, places: Places) -> Experiment:
     """The experiment of this name; BadInput names those that there are, or what its file lacks."""
-    known = names(places)
+    known_names = names(places)
     name = name.replace("_", "-")
-    if name not in known:
-        raise BadInput("NAME", name, f"unknown experiment; expected {did_you_mean(known, name)}")
+    if name not in known_names:
+        raise BadInput("NAME", name, f"unknown experiment; expected {did_you_mean(known_names, name)}")
     file = places.figures / f"{name.replace('-', '_')}.py"
     module = _module(file)
-    for wanted in NEEDED:
-        if not hasattr(module, wanted):
-            raise BadInput(str(file), wanted, f"is missing: expected {', '.join(NEEDED)}")
+    for required in NEEDED:
+        if not hasattr(module, required):
+            raise BadInput(str(file), required, f"is missing: expected {', '.join(NEEDED)}")
     about = (getdoc(module) or "").partition("\n")[0]
     return Experiment(name, about, tuple(module.CAMPAIGNS), tuple(module.COLUMNS), module)
 

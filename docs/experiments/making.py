@@ -53,8 +53,8 @@ def digest(experiment: Experiment, places: Places, folders: Sequence[Path] = ())
             frame.write_parquet(aside, compression="zstd", compression_level=9, statistics=False)
     size = sum(file.stat().st_size for file in _files(experiment, places) if file.exists())
     if size > MAX_BYTES:
-        kept = f"expected at most {MAX_BYTES / 1e6:g} MB in all, got {size / 1e6:.1f}: keep fewer columns"
-        raise BadInput(str(places.data), experiment.name, kept)
+        expected = f"expected at most {MAX_BYTES / 1e6:g} MB in all, got {size / 1e6:.1f}: keep fewer columns"
+        raise BadInput(str(places.data), experiment.name, expected)
     return written
 
 
@@ -66,16 +66,16 @@ def digest_of(experiment: Experiment, folder: Path) -> pl.DataFrame:
         raise BadInput(
             str(folder), "", f"expected a campaign that is over; {lacking}: swarmwire sweep --resume {folder}"
         )
-    own = experiment.digested(folder, campaign.runs)
-    if own is not None:
-        return own
-    there = campaign.runs.columns
+    custom = experiment.digested(folder, campaign.runs)
+    if custom is not None:
+        return custom
+    columns = campaign.runs.columns
     for name in experiment.columns:
-        if name not in there:
+        if name not in columns:
             raise BadInput(
-                str(folder), name, f"expected a column that the campaign has: {did_you_mean(tuple(there), name)}"
+                str(folder), name, f"expected a column that the campaign has: {did_you_mean(tuple(columns), name)}"
             )
-    ends = [name for name in ENDS if name in there]
+    ends = [name for name in ENDS if name in columns]
     chosen = dict.fromkeys((*BEGIN, *campaign.parameters, *ends, *experiment.columns, *LAST))
     return campaign.runs.select(*chosen)
 
@@ -92,19 +92,21 @@ def _files(experiment: Experiment, places: Places) -> list[Path]:
     return [places.data / f"{campaign}.parquet" for campaign in experiment.campaigns]
 
 
-def _folders(experiment: Experiment, places: Places, given: Sequence[Path]) -> dict[str, Path]:
+def _folders(experiment: Experiment, places: Places, folders: Sequence[Path]) -> dict[str, Path]:
     """Folders by campaign."""
-    known = experiment.campaigns
-    if not given:
-        return {campaign: places.swept / campaign for campaign in known}
-    if len(given) == len(known) == 1:
-        return {known[0]: given[0]}
-    for folder in given:
-        if folder.name not in known:
+    campaigns = experiment.campaigns
+    if not folders:
+        return {campaign: places.swept / campaign for campaign in campaigns}
+    if len(folders) == len(campaigns) == 1:
+        return {campaigns[0]: folders[0]}
+    for folder in folders:
+        if folder.name not in campaigns:
             raise BadInput(
-                "FOLDER", str(folder), f"expected a folder named as its campaign: {did_you_mean(known, folder.name)}"
+                "FOLDER",
+                str(folder),
+                f"expected a folder named as its campaign: {did_you_mean(campaigns, folder.name)}",
             )
-    return {folder.name: folder for folder in given}
+    return {folder.name: folder for folder in folders}
 
 
 def draw(experiment: Experiment, places: Places) -> str:
@@ -113,17 +115,17 @@ def draw(experiment: Experiment, places: Places) -> str:
     BadInput where a digest is missing, or the page has no place for the numbers.
     """
     runs = digests(experiment, places)
-    told = experiment.told(runs)
+    numbers_text = experiment.numbers(runs)
     page = places.pages / f"{experiment.name}.md"
-    files = page_files(page, told) if page.exists() else {}
+    files = page_files(page, numbers_text) if page.exists() else {}
     save(experiment.draw(runs), places.figure_of(experiment.name))
     for file, text in files.items():
         file.parent.mkdir(exist_ok=True)
         write_text(file, text)
-    return told
+    return numbers_text
 
 
-def page_files(page: Path, told: str) -> dict[Path, str]:
+def page_files(page: Path, numbers_text: str) -> dict[Path, str]:
     """Texts by file: the page with the numbers between its marks, and a CSV file for each long table of them.
 
     BadInput unless the page has both marks, once.
@@ -140,10 +142,12 @@ def page_files(page: Path, told: str) -> dict[Path, str]:
         path = file.relative_to(page.parent)
         return f"Table: [{file.name}]({path})\n\n```{{csv-table}}\n:file: {path}\n:header-rows: 1\n```\n"
 
-    told = TABLE.sub(replacement, f"{told}\n").rstrip("\n")
+    numbers_text = TABLE.sub(replacement, f"{numbers_text}\n").rstrip("\n")
     if text.count(BEGIN_MARK) != 1 or text.count(END_MARK) != 1 or text.index(BEGIN_MARK) > text.index(END_MARK):
         raise BadInput(str(page), "", f"expected one line {BEGIN_MARK}, and {END_MARK} below it")
-    files[page] = f"{text.partition(BEGIN_MARK)[0]}{BEGIN_MARK}\n{told}\n{END_MARK}{text.partition(END_MARK)[2]}"
+    files[page] = (
+        f"{text.partition(BEGIN_MARK)[0]}{BEGIN_MARK}\n{numbers_text}\n{END_MARK}{text.partition(END_MARK)[2]}"
+    )
     return files
 
 

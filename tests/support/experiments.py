@@ -50,7 +50,7 @@ def miniature(
     runs = {campaign: _digest(experiment, campaign, folder, seeds, vary or {}, overrides) for campaign in asked}
     if campaigns is not None:
         return Miniature(runs, None, "")
-    return Miniature(runs, experiment.draw(runs), experiment.told(runs))
+    return Miniature(runs, experiment.draw(runs), experiment.numbers(runs))
 
 
 def _digest(

@@ -58,8 +58,8 @@ class Graph:
         mean_step = np.eye(n) - self.gain * received * self.laplacian
         second, degree = np.outer(self.start, self.start), self.adjacency.sum(axis=1)
         for _ in range(steps):
-            own = np.diag(second)
-            apart = self.adjacency @ own + degree * own - 2.0 * (self.adjacency * second).sum(axis=1)
+            variances = np.diag(second)
+            apart = self.adjacency @ variances + degree * variances - 2.0 * (self.adjacency * second).sum(axis=1)
             scatter = self.gain**2 * loss * received * apart
             second = mean_step @ second @ mean_step.T + np.diag(scatter)
         square_of_mean = second.sum() / n**2
@@ -71,7 +71,7 @@ def graph_of(scenario: Path, range_m: float | None = None) -> Graph:
     """The graph of a scenario whose robots stand at given poses; with another range of the radio, if told."""
     table = tomllib.loads(scenario.read_text(encoding="utf-8"))
     nodes, reach_m = table["robots"]["nodes"], range_m or table["radio"]["range_m"]
-    place_m = np.array(nodes["place"]["poses"], np.float64)[:, :2]
-    apart_m = np.linalg.norm(place_m[:, None] - place_m[None, :], axis=2)
-    adjacency = ((apart_m <= reach_m) & ~np.eye(len(place_m), dtype=bool)).astype(np.float64)
+    position_m = np.array(nodes["place"]["poses"], np.float64)[:, :2]
+    apart_m = np.linalg.norm(position_m[:, None] - position_m[None, :], axis=2)
+    adjacency = ((apart_m <= reach_m) & ~np.eye(len(position_m), dtype=bool)).astype(np.float64)
     return Graph(adjacency, np.array(nodes["params"]["start"], np.float64), nodes["params"]["gain"])

@@ -26,13 +26,13 @@ LIMIT_S = 300.0
 def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
     """The times of each run, whether there were obstacles, and by radio range also the distances over time."""
     varied = runs.columns[runs.columns.index("seed") + 1 : runs.columns.index("ended")]
-    kept = runs.select("run", "point", "seed", *varied, "ended", "sim_time_s", HALF, "timing_wall_s")
-    kept = kept.join(_first_times(folder), on="run", how="left", maintain_order="left")
+    digest = runs.select("run", "point", "seed", *varied, "ended", "sim_time_s", HALF, "timing_wall_s")
+    digest = digest.join(_first_times(folder), on="run", how="left", maintain_order="left")
     if "arena.obstacles" in varied:
-        kept = kept.with_columns(obstacles=pl.col("arena.obstacles") != "[]").drop("arena.obstacles")
+        digest = digest.with_columns(obstacles=pl.col("arena.obstacles") != "[]").drop("arena.obstacles")
     if folder.name.startswith("pso-range"):
-        kept = kept.join(_distances(folder), on="run", how="left", maintain_order="left")
-    return kept
+        digest = digest.join(_distances(folder), on="run", how="left", maintain_order="left")
+    return digest
 
 
 def at(runs: pl.DataFrame, **values: Any) -> pl.DataFrame:
@@ -58,24 +58,27 @@ def mean_distances(runs: pl.DataFrame) -> FloatArray:
     return np.mean(np.array(runs["distance_m"].to_list()), axis=0)
 
 
-def quartiles(of: Summary) -> str:
+def quartiles(statistics: Summary) -> str:
     """The median with both quartiles, and the censored share where there is one."""
-    three = [f"> {of.limit:.0f}" if np.isnan(time) else f"{time:.0f}" for time in (of.q50, of.q25, of.q75)]
-    late = f", {100.0 * of.censored:.0f} % not" if of.censored > 0.0 else ""
+    three = [
+        f"> {statistics.limit:.0f}" if np.isnan(time) else f"{time:.0f}"
+        for time in (statistics.q50, statistics.q25, statistics.q75)
+    ]
+    late = f", {100.0 * statistics.censored:.0f} % not" if statistics.censored > 0.0 else ""
     return f"{three[0]} ({three[1]} to {three[2]}{late})"
 
 
 def difference_text(first: Sample, second: Sample) -> str:
     """Second less first: means of min(time, limit) with their interval, and p."""
-    found = difference(first, second)
-    p = "< 0.001" if found.p < 0.001 else f"{found.p:.2g}"
-    return f"{found.mean:+.0f} ({_interval(found.mean_interval)}), {p}"
+    effect = difference(first, second)
+    p = "< 0.001" if effect.p < 0.001 else f"{effect.p:.2g}"
+    return f"{effect.mean:+.0f} ({_interval(effect.mean_interval)}), {p}"
 
 
 def mean_text(sample: Sample) -> str:
     """Mean of min(time, limit) with its interval."""
-    of = summary(sample)
-    return f"{of.mean:.0f} ({_interval(of.mean_interval)})"
+    statistics = summary(sample)
+    return f"{statistics.mean:.0f} ({_interval(statistics.mean_interval)})"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -84,32 +87,38 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _interval(of: Interval) -> str:
-    return f"{of.low:.0f} to {of.high:.0f}"
+def _interval(interval: Interval) -> str:
+    return f"{interval.low:.0f} to {interval.high:.0f}"
 
 
 def _first_times(folder: Path) -> pl.DataFrame:
     """By run: when the first robot was within NEAR_M of the light; runs in which none was are missing."""
-    there = pl.scan_parquet(folder / "series" / "*.parquet").filter(pl.col("target_best") <= NEAR_M)
-    return there.group_by("run").agg((pl.col("tick").min() / RATE_HZ).alias(FIRST)).collect()
+    near = pl.scan_parquet(folder / "series" / "*.parquet").filter(pl.col("target_best") <= NEAR_M)
+    return near.group_by("run").agg((pl.col("tick").min() / RATE_HZ).alias(FIRST)).collect()
 
 
 def _distances(folder: Path) -> pl.DataFrame:
     """By run: mean distance to the light in m, each EVERY_S from the start on, a list."""
     ticks = int(EVERY_S * RATE_HZ)
-    some = pl.scan_parquet(folder / "series" / "*.parquet").filter(pl.col("tick") % ticks == 0)
-    return some.sort("run", "tick").group_by("run", maintain_order=True).agg(distance_m="target_mean").collect()
+    sampled = pl.scan_parquet(folder / "series" / "*.parquet").filter(pl.col("tick") % ticks == 0)
+    return sampled.sort("run", "tick").group_by("run", maintain_order=True).agg(distance_m="target_mean").collect()
 
 
 def against_model(robots: pl.DataFrame, model: pl.DataFrame, column: str, name: str) -> str:
     """Time to the first and to half by what a column says, robots beside point particles."""
-    head = [name, *(f"{what}: {who}" for what in ("first", "half") for who in COMPARED)]
+    head = [name, *(f"{event}: {who}" for event in ("first", "half") for who in COMPARED)]
     rows: list[list[str]] = []
     for value in robots[column].unique(maintain_order=True):
         row = [f"{value:g}"]
         for response in (FIRST, HALF):
-            one, other = (times(runs.filter(pl.col(column) == value), response) for runs in (model, robots))
-            row += [quartiles(summary(other)), quartiles(summary(one)), difference_text(one, other)]
+            model_times, robot_times = (
+                times(runs.filter(pl.col(column) == value), response) for runs in (model, robots)
+            )
+            row += [
+                quartiles(summary(robot_times)),
+                quartiles(summary(model_times)),
+                difference_text(model_times, robot_times),
+            ]
         rows.append(row)
     return table(head, rows)
 
@@ -117,7 +126,8 @@ def against_model(robots: pl.DataFrame, model: pl.DataFrame, column: str, name: 
 def steps_table(steps: Sequence[tuple[str, pl.DataFrame]], base: pl.DataFrame) -> str:
     """Time to half in each step, and what it is more than in the base."""
     rows = [
-        [label, *(quartiles(summary(times(runs, of))) for of in (FIRST, HALF)), mean_text(times(runs, HALF)),
+        [label, *(quartiles(summary(times(runs, response))) for response in (FIRST, HALF)),
+         mean_text(times(runs, HALF)),
          "" if runs is base else difference_text(times(base, HALF), times(runs, HALF))]
         for label, runs in steps
     ]  # fmt: skip
@@ -128,10 +138,14 @@ def variants_table(runs: pl.DataFrame, columns: Mapping[str, str]) -> str:
     """Time to the first and to half at each point of a design, told by these columns and what they are called."""
     rows: list[list[str]] = []
     for values in runs.select(*columns).unique(maintain_order=True).iter_rows():
-        some = at(runs, **dict(zip(columns, values, strict=True)))
-        told = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
+        selected = at(runs, **dict(zip(columns, values, strict=True)))
+        cells = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
         rows.append(
-            [*told, *(quartiles(summary(times(some, of))) for of in (FIRST, HALF)), mean_text(times(some, HALF))]
+            [
+                *cells,
+                *(quartiles(summary(times(selected, response))) for response in (FIRST, HALF)),
+                mean_text(times(selected, HALF)),
+            ]
         )
     return table([*columns.values(), "first", "half", "half, mean up to 300 s"], rows)
 
@@ -154,26 +168,26 @@ def panels(titles: Sequence[tuple[str, str]]) -> tuple[Any, list[Any]]:
     """A figure of two rows of three axes at most, each with what stands above it and below."""
     figure = blank_figure(7.2, 4.6 if len(titles) > 3 else 2.3)
     rows = -(-len(titles) // 3)
-    found: list[Any] = []
+    panel_axes: list[Any] = []
     for k, (title, below) in enumerate(titles):
         low, height = (0.6 - 0.5 * (k // 3), 0.32) if rows > 1 else (0.2, 0.64)
         axes = plain_axes(figure, (0.05 + 0.325 * (k % 3), low, 0.265, height), title)
         axes.set_xlabel(below, fontsize=TEXT_PT, color=SOFT)
-        found.append(axes)
-    return figure, found
+        panel_axes.append(axes)
+    return figure, panel_axes
 
 
 def times_by(runs: pl.DataFrame, column: str) -> tuple[list[float], list[Sample]]:
     """The values of a column, and the times to half at each."""
-    told = values(runs, column)
-    return told, [times(runs.filter(pl.col(column) == value), HALF) for value in told]
+    column_values = values(runs, column)
+    return column_values, [times(runs.filter(pl.col(column) == value), HALF) for value in column_values]
 
 
 def time_curve(axes: Any, x: Sequence[float], samples: Sequence[Sample], look: Look) -> None:
     """Median times with their intervals; what lies beyond the limit is a triangle at it."""
-    of = [summary(sample) for sample in samples]
-    median = np.array([one.q50 for one in of])
-    ends = [np.array([getattr(one.q50_interval, end) for one in of]) for end in ("low", "high")]
+    statistics = [summary(sample) for sample in samples]
+    median = np.array([entry.q50 for entry in statistics])
+    ends = [np.array([getattr(entry.q50_interval, end) for entry in statistics]) for end in ("low", "high")]
     low, high = (np.where(np.isfinite(end), end, LIMIT_S) for end in ends)
     axes.vlines(x, low, high, color=look["color"], lw=0.9, zorder=3)
     axes.plot(x, median, **look)
@@ -199,11 +213,11 @@ def distance_curves(axes: Any, runs: pl.DataFrame, ranges: Sequence[float], look
 
 def ladder(axes: Any, steps: Sequence[tuple[str, pl.DataFrame, Any]]) -> None:
     """Mean time to half, up to the limit, with its interval, for each step; the first at the top."""
-    for place, (_, runs, color) in enumerate(steps):
-        of = summary(times(runs, HALF))
-        axes.plot([of.mean_interval.low, of.mean_interval.high], [-place] * 2, color=color, lw=1.4)
-        axes.plot(of.mean, -place, "o", ms=4, color=color)
-    axes.set_yticks([-place for place in range(len(steps))], [label for label, _, _ in steps])
+    for row, (_, runs, color) in enumerate(steps):
+        statistics = summary(times(runs, HALF))
+        axes.plot([statistics.mean_interval.low, statistics.mean_interval.high], [-row] * 2, color=color, lw=1.4)
+        axes.plot(statistics.mean, -row, "o", ms=4, color=color)
+    axes.set_yticks([-row for row in range(len(steps))], [label for label, _, _ in steps])
     axes.tick_params(axis="y", length=0, labelsize=SMALL_PT, labelcolor=INK)
     axes.set_ylim(-len(steps) + 0.4, 0.8)
     axes.grid(axis="x", color=SOFT, lw=0.3, alpha=0.5)

@@ -15,17 +15,17 @@ PANEL_IN, HEIGHT_IN = 2.9, 2.35
 _LEFT_IN, _RIGHT_IN, _FOOT_IN, _HEAD_IN = 0.42, 0.12, 0.42, 0.26
 
 
-def panels(*said: tuple[str, str]) -> tuple[Any, list[Any]]:
+def panels(*titles: tuple[str, str]) -> tuple[Any, list[Any]]:
     """A figure with axes side by side, for each a title and what its x axis shows."""
-    figure = blank_figure(PANEL_IN * len(said), HEIGHT_IN)
+    figure = blank_figure(PANEL_IN * len(titles), HEIGHT_IN)
     wide, high = PANEL_IN - _LEFT_IN - _RIGHT_IN, HEIGHT_IN - _FOOT_IN - _HEAD_IN
-    found: list[Any] = []
-    for place, (title, x_label) in enumerate(said):
-        left = (place * PANEL_IN + _LEFT_IN) / (PANEL_IN * len(said))
-        axes = plain_axes(figure, (left, _FOOT_IN / HEIGHT_IN, wide / PANEL_IN / len(said), high / HEIGHT_IN), title)
+    panel_axes: list[Any] = []
+    for column, (title, x_label) in enumerate(titles):
+        left = (column * PANEL_IN + _LEFT_IN) / (PANEL_IN * len(titles))
+        axes = plain_axes(figure, (left, _FOOT_IN / HEIGHT_IN, wide / PANEL_IN / len(titles), high / HEIGHT_IN), title)
         axes.set_xlabel(x_label, fontsize=TEXT_PT, color=SOFT, labelpad=3)
-        found.append(axes)
-    return figure, found
+        panel_axes.append(axes)
+    return figure, panel_axes
 
 
 def mean_and_interval(value: FloatArray) -> tuple[float, Interval]:
@@ -35,11 +35,11 @@ def mean_and_interval(value: FloatArray) -> tuple[float, Interval]:
 
 def means(axes: Any, x: Sequence[float], values: Sequence[FloatArray], **look: Any) -> None:
     """Means over runs as points, their intervals as lines."""
-    of = [mean_and_interval(value) for value in values]
-    low, high = (np.array([interval[end] for _, interval in of]) for end in (0, 1))
+    estimates = [mean_and_interval(value) for value in values]
+    low, high = (np.array([interval[end] for _, interval in estimates]) for end in (0, 1))
     axes.vlines(x, low, high, color=look["color"], lw=1.0, zorder=3)
-    given: Look = {"ms": 3, "lw": 1.2, "zorder": 4, **look}
-    axes.plot(x, [mean for mean, _ in of], "o-" if "ls" not in given else "o", **given)
+    options: Look = {"ms": 3, "lw": 1.2, "zorder": 4, **look}
+    axes.plot(x, [mean for mean, _ in estimates], "o-" if "ls" not in options else "o", **options)
 
 
 def legend(axes: Any, **where: Any) -> None:

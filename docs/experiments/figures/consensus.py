@@ -53,8 +53,8 @@ class Point(NamedTuple):
 def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
     """What was left after the steps in which the formula says that a fifth is left."""
     by = [name for name in (RANGE, LOSS) if name in runs.columns]
-    own = {campaign: (scenario, range_m) for _, campaign, scenario, range_m in (*GRAPHS, AGAIN)}
-    scenario, range_m = own[folder.name]
+    graphs = {campaign: (scenario, range_m) for _, campaign, scenario, range_m in (*GRAPHS, AGAIN)}
+    scenario, range_m = graphs[folder.name]
     ranges = runs[RANGE].unique() if RANGE in by else [range_m]
     graphs = {reach_m: _graph(scenario, reach_m) for reach_m in ranges}
     steps = [
@@ -62,8 +62,10 @@ def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
     ]
     at = runs.with_columns(pl.Series("steps", steps, pl.Int32))
     series = pl.scan_parquet(folder / "series" / "*.parquet").select("run", pl.col("tick").alias("steps"), *COLUMNS)
-    kept = at.lazy().join(series, on=["run", "steps"], how="left", suffix="_")
-    return kept.select("run", "point", "seed", *by, "ended", "sim_time_s", "steps", *COLUMNS, "timing_wall_s").collect()
+    joined = at.lazy().join(series, on=["run", "steps"], how="left", suffix="_")
+    return joined.select(
+        "run", "point", "seed", *by, "ended", "sim_time_s", "steps", *COLUMNS, "timing_wall_s"
+    ).collect()
 
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
@@ -85,7 +87,7 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     return figure
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """A row per graph and loss, and how many intervals hold the formula."""
     rows: list[list[str]] = []
     held, intervals = dict.fromkeys(runs, 0), dict.fromkeys(runs, 0)
@@ -100,12 +102,12 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
         exact_error = (exact.error / first) ** (1.0 / point.steps)
         texts = [f"{decay:.4f}", _text(mean), f"{exact_error:.4f}", _text(error), f"{exact.bias:.4f}", _text(bias)]
         rows.append([point.name, f"{point.loss:g}", str(point.steps), *texts])
-    of = [
+    statements = [
         f"{held[campaign]} of {count} of `{campaign}` ({runs[campaign]['seed'].n_unique()} seeds)"
         for campaign, count in intervals.items()
     ]
     hold = "Where packets are lost, so many 95 % intervals of the mean decay hold the formula"
-    return f"{table(HEAD, rows)}\n\n{hold}: {', '.join(of)}."
+    return f"{table(HEAD, rows)}\n\n{hold}: {', '.join(statements)}."
 
 
 def _graph(scenario: str, range_m: float | None) -> Graph:
@@ -115,10 +117,10 @@ def _graph(scenario: str, range_m: float | None) -> Graph:
 def _points(runs: Mapping[str, pl.DataFrame]) -> Iterator[Point]:
     """All points, graph by graph, losses rising."""
     for name, campaign, scenario, range_m in (*GRAPHS, AGAIN):
-        of = runs[campaign]
-        if RANGE in of.columns:
-            of = of.filter(pl.col(RANGE) == range_m)
-        for (loss,), at in of.sort(LOSS, "seed").group_by(LOSS, maintain_order=True):
+        campaign_runs = runs[campaign]
+        if RANGE in campaign_runs.columns:
+            campaign_runs = campaign_runs.filter(pl.col(RANGE) == range_m)
+        for (loss,), at in campaign_runs.sort(LOSS, "seed").group_by(LOSS, maintain_order=True):
             values = (at[column].to_numpy().astype(np.float64) for column in COLUMNS)
             yield Point(name, campaign, _graph(scenario, range_m), float(str(loss)), int(at["steps"][0]), *values)
 
@@ -135,10 +137,10 @@ def _root(values: FloatArray, steps: int) -> tuple[float, float, float]:
     return mean ** (0.5 / steps), max(low, 0.0) ** (0.5 / steps), high ** (0.5 / steps)
 
 
-def _measured(axes: Any, x: list[float], of: list[tuple[float, float, float]], color: Any, label: str) -> None:
-    axes.vlines(x, [low for _, low, _ in of], [high for *_, high in of], color=color, lw=1.0, zorder=3)
-    axes.plot(x, [mean for mean, *_ in of], "o", ms=3, color=color, label=label, zorder=4)
+def _measured(axes: Any, x: list[float], estimates: list[tuple[float, float, float]], color: Any, label: str) -> None:
+    axes.vlines(x, [low for _, low, _ in estimates], [high for *_, high in estimates], color=color, lw=1.0, zorder=3)
+    axes.plot(x, [mean for mean, *_ in estimates], "o", ms=3, color=color, label=label, zorder=4)
 
 
-def _text(of: tuple[float, float, float]) -> str:
-    return f"{of[0]:.4f} ({of[1]:.4f} to {of[2]:.4f})"
+def _text(estimate: tuple[float, float, float]) -> str:
+    return f"{estimate[0]:.4f} ({estimate[1]:.4f} to {estimate[2]:.4f})"

@@ -34,10 +34,10 @@ def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
     late = series.filter(pl.col("tick") >= BURN_IN * pl.col("ticks")).fill_nan(None)
     minutes = pl.col("sim_time_s").first() * (1.0 - BURN_IN) / 60.0
     flow = (_last_less_first(pl.col("gate").cast(pl.Float64)).abs() / minutes).alias("flow_per_min")
-    of = late.group_by("run").agg(flow, *(pl.col(name).cast(pl.Float64).mean() for name in MEASURED)).collect()
+    means = late.group_by("run").agg(flow, *(pl.col(name).cast(pl.Float64).mean() for name in MEASURED)).collect()
     varied = [name for name in (STEPS, COUNT) if name in runs.columns]
-    kept = ("run", "point", "seed", *varied, "ended", "sim_time_s", *COLUMNS, "timing_wall_s")
-    return runs.join(of, on="run", how="left", maintain_order="left").select(kept)
+    columns = ("run", "point", "seed", *varied, "ended", "sim_time_s", *COLUMNS, "timing_wall_s")
+    return runs.join(means, on="run", how="left", maintain_order="left").select(columns)
 
 
 def _last_less_first(total: pl.Expr) -> pl.Expr:
@@ -81,7 +81,7 @@ def frozen(runs: pl.DataFrame, campaign: str) -> ChangePoint | None:
     return change_point(covered(np.array(counts), campaign), still)
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """Tables of ring and box, and where the box freezes."""
     ring = runs["dense"]
     fine, coarse = (ring.filter(pl.col(STEPS) == steps) for steps in (FINE, COARSE))
@@ -90,8 +90,8 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
         for count, *cells in zip(
             _by_count(fine, "speed")[0],
             *(
-                _cells(of, name, digits)
-                for of, name, digits in (
+                _cells(ring_runs, name, digits)
+                for ring_runs, name, digits in (
                     (fine, "flow_per_min", 1),
                     (coarse, "flow_per_min", 1),
                     (fine, "speed", 3),
@@ -119,15 +119,15 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
 
 def _box(runs: Mapping[str, pl.DataFrame]) -> list[list[str]]:
     fine, coarse = runs["dense-box"], runs["dense-box-coarse"]
-    beside = dict(zip(_by_count(coarse, "speed")[0], _cells(coarse, "speed", 4), strict=True))
+    coarse_speeds = dict(zip(_by_count(coarse, "speed")[0], _cells(coarse, "speed", 4), strict=True))
     counts = _by_count(fine, "speed")[0]
     columns = [
         _cells(fine, name, digits)
         for name, digits in (("speed", 4), ("order", 2), ("order_local", 2), ("deadlocked", 3))
     ]
     return [
-        [str(count), f"{covered(count, 'dense-box'):.2f}", speed, beside.get(count, ""), *rest]
-        for count, speed, *rest in zip(counts, *columns, strict=True)
+        [str(count), f"{covered(count, 'dense-box'):.2f}", speed, coarse_speeds.get(count, ""), *cells]
+        for count, speed, *cells in zip(counts, *columns, strict=True)
     ]
 
 

@@ -54,11 +54,13 @@ CAUSES = {
 def digested(_folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
     """The columns, and of a rock its width."""
     varied = runs.columns[runs.columns.index("seed") + 1 : runs.columns.index("ended")]
-    kept = runs.select("run", "point", "seed", *varied, "ended", "stop_time_s", "sim_time_s", *COLUMNS, "timing_wall_s")
+    digest = runs.select(
+        "run", "point", "seed", *varied, "ended", "stop_time_s", "sim_time_s", *COLUMNS, "timing_wall_s"
+    )
     if OBSTACLES not in varied:
-        return kept
-    width_m = [2.0 * max(x for x, _ in json.loads(text)[0]["points"]) for text in kept[OBSTACLES]]
-    return kept.with_columns(pl.Series(OBSTACLES, width_m, pl.Float64)).rename({OBSTACLES: WIDTH})
+        return digest
+    width_m = [2.0 * max(x for x, _ in json.loads(text)[0]["points"]) for text in digest[OBSTACLES]]
+    return digest.with_columns(pl.Series(OBSTACLES, width_m, pl.Float64)).rename({OBSTACLES: WIDTH})
 
 
 def fell_apart(runs: pl.DataFrame) -> pl.DataFrame:
@@ -104,18 +106,18 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
 def _draw_cause(share: Any, time: Any, runs: pl.DataFrame, cause: Cause) -> None:
     kinds = runs[cause.kind].unique().sort().to_list()
     along = runs[cause.along].unique().sort().to_numpy()
-    table = {(kind, place): here for kind, place, here in points(runs, cause)}
+    table = {(kind, value): group for kind, value, group in points(runs, cause)}
     for k, (kind, color) in enumerate(zip(kinds, ordered_colors(len(kinds)), strict=True)):
-        here = [table[kind, place] for place in along]
+        groups = [table[kind, value] for value in along]
         x = along + (k - 0.5 * (len(kinds) - 1)) * APART * float(np.ptp(along))
-        split = np.array([len(fell_apart(one)) for one in here])
-        whole = np.array([np.count_nonzero(times_apart(one).observed) for one in here])
-        n = np.array([len(one) for one in here])
+        split = np.array([len(fell_apart(group)) for group in groups])
+        rejoined = np.array([np.count_nonzero(times_apart(group).observed) for group in groups])
+        n = np.array([len(group) for group in groups])
         share.plot(x, split / n, "o:", color=color, ms=3.0, lw=0.8, mfc="white")
-        low, high = binomial_interval(whole, np.maximum(n, 1))
-        share.plot(x, whole / n, "o-", color=color, ms=3.0, lw=1.0, label=cause.label.format(kind))
+        low, high = binomial_interval(rejoined, np.maximum(n, 1))
+        share.plot(x, rejoined / n, "o-", color=color, ms=3.0, lw=1.0, label=cause.label.format(kind))
         share.vlines(x, low, high, color=color, lw=0.8)
-        _draw_times(time, x, [times_apart(one) for one in here], color)
+        _draw_times(time, x, [times_apart(group) for group in groups], color)
     time.set_ylim(0.0, None)
     share.legend(
         fontsize=SMALL_PT,
@@ -128,13 +130,13 @@ def _draw_cause(share: Any, time: Any, runs: pl.DataFrame, cause: Cause) -> None
 
 def _draw_times(axes: Any, x: FloatArray, samples: list[Sample], color: Any) -> None:
     """Medians and quartiles; what lies beyond the limit is left out."""
-    found = [summary(sample) for sample in samples]
-    axes.plot(x, [of.q50 for of in found], "o-", color=color, ms=3.0, lw=1.0)
-    top = [of.limit if np.isnan(of.q75) else of.q75 for of in found]
-    axes.vlines(x, [of.q25 for of in found], top, color=color, lw=0.8)
+    summaries = [summary(sample) for sample in samples]
+    axes.plot(x, [statistics.q50 for statistics in summaries], "o-", color=color, ms=3.0, lw=1.0)
+    top = [statistics.limit if np.isnan(statistics.q75) else statistics.q75 for statistics in summaries]
+    axes.vlines(x, [statistics.q25 for statistics in summaries], top, color=color, lw=0.8)
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """A table for each cause."""
     return "\n\n".join(_table(runs[name], cause) for name, cause in CAUSES.items() if name in runs)
 
@@ -142,11 +144,11 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
 def _table(runs: pl.DataFrame, cause: Cause) -> str:
     heads = cause.axis, cause.kind_title, "fell apart", "re-joined", "whole at its end", "until whole again, s"
     lines = [" | ".join(heads), " | ".join(["---"] * len(heads))]
-    for kind, along, here in points(runs, cause):
-        times = times_apart(here)
+    for kind, along, group in points(runs, cause):
+        times = times_apart(group)
         rejoined = int(np.count_nonzero(times.observed))
         at_end = str(np.count_nonzero(times.value == 0.0)) if cause.along == FOR_S else "–"
-        cells = f"{along:g}", f"{kind:g}", f"{len(times)} of {len(here)}", _share(rejoined, len(times)), at_end
+        cells = f"{along:g}", f"{kind:g}", f"{len(times)} of {len(group)}", _share(rejoined, len(times)), at_end
         lines.append(" | ".join((*cells, quartiles_text(summary(times)))))
     title = f"Split by {cause.title}; times are medians with quartiles, censored runs counted as such:\n\n"
     return title + "\n".join(f"| {line} |" for line in lines)

@@ -26,7 +26,7 @@ TASKS = (
     Task("flocking", "flock.mean", "flocking: share in one aligned flock", 2),
     Task("search", "find_time_s", "search: time until half are at the light, s", 0),
 )
-CAMPAIGNS = tuple(f"learning-{task.name}{of}" for task in TASKS for of in ("-rule", ""))
+CAMPAIGNS = tuple(f"learning-{task.name}{suffix}" for task in TASKS for suffix in ("-rule", ""))
 COLUMNS = ()  # `digested` chooses
 WHO = {  # by what the file's name ends with; "": no file
     "": ("hand-written rule", SOFT),
@@ -57,16 +57,16 @@ def results(runs: Mapping[str, pl.DataFrame], task: Task) -> Mapping[str, Mappin
     """The runs of a task, by who acts and by loss; in the order of seeds."""
     both = pl.concat([runs[f"learning-{task.name}-rule"], runs[f"learning-{task.name}"]])
     ran = both.filter(pl.col("ended") != "failed").sort("seed")
-    found: dict[str, dict[float, pl.DataFrame]] = {}
+    by_agent: dict[str, dict[float, pl.DataFrame]] = {}
     for end, (who, _) in WHO.items():
-        mine = ran.filter(pl.col("agent").str.ends_with(f"-{end}") if end else pl.col("agent") == "")
-        found[who] = {loss: mine.filter(pl.col("loss") == loss) for loss in mine["loss"].unique().sort()}
-    return found
+        agent_runs = ran.filter(pl.col("agent").str.ends_with(f"-{end}") if end else pl.col("agent") == "")
+        by_agent[who] = {loss: agent_runs.filter(pl.col("loss") == loss) for loss in agent_runs["loss"].unique().sort()}
+    return by_agent
 
 
-def values(of: pl.DataFrame) -> FloatArray:
+def values(runs: pl.DataFrame) -> FloatArray:
     """The response of each run, (runs,)."""
-    return of["response"].to_numpy()
+    return runs["response"].to_numpy()
 
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
@@ -74,16 +74,16 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     figure, axes = panels(*((task.title, "packet loss") for task in TASKS))
     for ax, task in zip(axes, TASKS, strict=True):
         for (who, by_loss), (_, color) in zip(results(runs, task).items(), WHO.values(), strict=True):
-            means(ax, list(by_loss), [values(of) for of in by_loss.values()], color=color, label=who)
+            means(ax, list(by_loss), [values(group) for group in by_loss.values()], color=color, label=who)
         ax.set_ylim(bottom=0.0)
     legend(axes[0], loc="lower left")
     return figure
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """The response at each loss, how the policy trained under loss differs from both others, and contacts."""
     seeds = runs[CAMPAIGNS[0]]["seed"].n_unique()
-    minutes = sum(float(of["timing_wall_s"].sum()) for of in runs.values()) / 60.0
+    minutes = sum(float(frame["timing_wall_s"].sum()) for frame in runs.values()) / 60.0
     lines = [f"{sum(map(len, runs.values()))} runs, {seeds} seeds a point; {minutes:.0f} minutes of one worker."]
     for task in TASKS:
         lines += ["", f"**{task.title[0].upper()}{task.title[1:]}:**", "", _table(results(runs, task), task)]
@@ -91,30 +91,32 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
     return "\n".join(lines)
 
 
-def _table(of: Mapping[str, Mapping[float, pl.DataFrame]], task: Task) -> str:
-    rule, lossless, lossy = of
-    head = ["loss", *of, "third, less first", "third, less second"]
+def _table(by_agent: Mapping[str, Mapping[float, pl.DataFrame]], task: Task) -> str:
+    rule, lossless, lossy = by_agent
+    head = ["loss", *by_agent, "third, less first", "third, less second"]
     rows: list[list[str]] = []
-    for loss in of[rule]:
-        cells = [_cell(by_loss[loss], task) for by_loss in of.values()]
-        apart = [_apart(of[other][loss], of[lossy][loss], task) for other in (rule, lossless)]
+    for loss in by_agent[rule]:
+        cells = [_cell(by_loss[loss], task) for by_loss in by_agent.values()]
+        apart = [_apart(by_agent[other][loss], by_agent[lossy][loss], task) for other in (rule, lossless)]
         rows.append([f"{loss:g}", *cells, *apart])
     return table(head, rows)
 
 
-def _apart(one: pl.DataFrame, other: pl.DataFrame, task: Task) -> str:
-    found = difference(number_sample(values(one)), number_sample(values(other)))
-    return within(found.mean, found.mean_interval, task.digits)
+def _apart(first: pl.DataFrame, second: pl.DataFrame, task: Task) -> str:
+    effect = difference(number_sample(values(first)), number_sample(values(second)))
+    return within(effect.mean, effect.mean_interval, task.digits)
 
 
-def _contacts(of: Mapping[str, Mapping[float, pl.DataFrame]]) -> str:
+def _contacts(by_agent: Mapping[str, Mapping[float, pl.DataFrame]]) -> str:
     """Contacts between robots a run, over all losses."""
-    every = {who: pl.concat(by_loss.values())["collisions"].cast(pl.Float64).to_numpy() for who, by_loss in of.items()}
-    said = ", ".join(f"{who} {collisions.mean():.1f}" for who, collisions in every.items())
-    return f"Contacts between robots a run, over all losses: {said}."
+    every = {
+        who: pl.concat(by_loss.values())["collisions"].cast(pl.Float64).to_numpy() for who, by_loss in by_agent.items()
+    }
+    contacts = ", ".join(f"{who} {collisions.mean():.1f}" for who, collisions in every.items())
+    return f"Contacts between robots a run, over all losses: {contacts}."
 
 
-def _cell(of: pl.DataFrame, task: Task) -> str:
-    mean, interval = mean_and_interval(values(of))
-    never = int((~of["observed"]).sum())
+def _cell(runs: pl.DataFrame, task: Task) -> str:
+    mean, interval = mean_and_interval(values(runs))
+    never = int((~runs["observed"]).sum())
     return within(mean, interval, task.digits) + (f", {never} never" if never else "")

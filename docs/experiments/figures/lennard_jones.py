@@ -25,8 +25,8 @@ def points(runs: Mapping[str, pl.DataFrame], column: str) -> list[tuple[float, f
     """Latency, loss, and a summary of the runs there."""
     groups = runs["lennard-jones"].sort(LATENCY, LOSS).group_by(LATENCY, LOSS, maintain_order=True)
     return [
-        (float(latency), float(loss), summary(number_sample(of[column].cast(pl.Float64).to_numpy())))
-        for (latency, loss), of in groups
+        (float(latency), float(loss), summary(number_sample(group[column].cast(pl.Float64).to_numpy())))
+        for (latency, loss), group in groups
     ]
 
 
@@ -38,12 +38,16 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
 
     figure = blank_figure(6.4, 4.2)
     for k, (column, title) in enumerate(SHOWN.items()):
-        found = points(runs, column)
-        latencies = sorted({latency for latency, _, _ in found})
+        results = points(runs, column)
+        latencies = sorted({latency for latency, _, _ in results})
         axes = plain_axes(figure, (0.07 + 0.5 * (k % 2), 0.58 - 0.48 * (k // 2), 0.4, 0.34), title)
         for latency, color in zip(latencies, ordered_colors(len(latencies)), strict=True):
             loss, mean, low, high = np.array(
-                [(at, of.mean, *of.mean_interval) for late, at, of in found if late == latency]
+                [
+                    (at, statistics.mean, *statistics.mean_interval)
+                    for late, at, statistics in results
+                    if late == latency
+                ]
             ).T
             axes.plot(loss, mean, "o-", color=color, ms=2.5, lw=1.2, label=f"{latency:g} s late")
             axes.fill_between(loss, low, high, color=color, alpha=0.15, lw=0.0)
@@ -54,17 +58,17 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     return figure
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """Means over runs with their 95 % intervals."""
     columns = [points(runs, column) for column in SHOWN]
     rows = [
-        f"| {late:g} s | {loss:g} | {of.n} | " + " | ".join(text(column[k][2]) for column in columns) + " |"
-        for k, (late, loss, of) in enumerate(columns[0])
+        f"| {late:g} s | {loss:g} | {statistics.n} | " + " | ".join(text(column[k][2]) for column in columns) + " |"
+        for k, (late, loss, statistics) in enumerate(columns[0])
     ]
     head = f"| latency | loss | runs | {' | '.join(SHOWN.values())} |"
     return "\n".join((head, "| " + "--- | " * (3 + len(SHOWN)), *rows)).replace("| \n", "|\n")
 
 
-def text(of: Summary) -> str:
+def text(statistics: Summary) -> str:
     """A mean with its interval."""
-    return f"{number_text(of.mean)} ({interval_text(of.mean_interval)})"
+    return f"{number_text(statistics.mean)} ({interval_text(statistics.mean_interval)})"

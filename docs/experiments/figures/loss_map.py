@@ -47,9 +47,9 @@ def results(runs: pl.DataFrame, behaviour: str) -> pl.DataFrame:
     return ran.select(loss.alias("loss"), latency, "seed", "radio.link_pdr", success.alias("success"))
 
 
-def shares(of: pl.DataFrame) -> tuple[FloatArray, FloatArray, FloatArray]:
+def shares(runs: pl.DataFrame) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Losses (columns,), latencies in s (rows,), and the share of runs that succeed (rows, columns)."""
-    table = of.group_by("latency_s", "loss").agg(pl.col("success").mean()).sort("latency_s", "loss")
+    table = runs.group_by("latency_s", "loss").agg(pl.col("success").mean()).sort("latency_s", "loss")
     losses, latencies = table["loss"].unique().sort().to_numpy(), table["latency_s"].unique().sort().to_numpy()
     return losses, latencies, table["success"].to_numpy().reshape(len(latencies), len(losses))
 
@@ -97,7 +97,7 @@ def _draw_half(axes: Any, share: FloatArray) -> None:
         axes.contour(x, y, np.pad(share, 1, mode="edge"), levels=[HALF], colors=[color], linewidths=width)
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """Success at chosen cells, the difference that bursts make there and over the whole map."""
     lines = [
         _size(runs),
@@ -106,17 +106,19 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
         f"|{' --- |' * 6}",
     ]
     for behaviour in BEHAVIOURS:
-        one, other = (results(runs[f"loss-map-{behaviour}{radio}"], behaviour) for radio in RADIOS)
-        lines += [line for cell in CELLS if (line := _cell_line(behaviour, one, other, *cell))]
-        lines.append(f"| {behaviour} | all | all | {_mean(one)} | {_mean(other)} | {_difference(one, other)} |")
+        independent, bursts = (results(runs[f"loss-map-{behaviour}{radio}"], behaviour) for radio in RADIOS)
+        lines += [line for cell in CELLS if (line := _cell_line(behaviour, independent, bursts, *cell))]
+        lines.append(
+            f"| {behaviour} | all | all | {_mean(independent)} | {_mean(bursts)} | {_difference(independent, bursts)} |"
+        )
     return "\n".join([*lines, "", *_check_lines(runs)])
 
 
 def _size(runs: Mapping[str, pl.DataFrame]) -> str:
     """How many runs the maps are made of, and how long they took."""
-    maps = [of for name, of in runs.items() if name not in CHECKS]
+    maps = [frame for name, frame in runs.items() if name not in CHECKS]
     cells, seeds = maps[0].n_unique("point"), maps[0].n_unique("seed")
-    took_min = sum(float(of["timing_wall_s"].sum()) for of in maps) / 60.0
+    took_min = sum(float(frame["timing_wall_s"].sum()) for frame in maps) / 60.0
     total = sum(map(len, maps))
     return (
         f"{total} runs: {len(maps)} maps of {cells} cells, {seeds} seeds in each; {took_min:.0f} minutes of one worker."
@@ -126,45 +128,45 @@ def _size(runs: Mapping[str, pl.DataFrame]) -> str:
 def _check_lines(runs: Mapping[str, pl.DataFrame]) -> list[str]:
     """A table of what heals a break, latency by latency, without losses."""
     lines = ["| | latency, s | as in the map | with the change | difference |", f"|{' --- |' * 5}"]
-    for name, (behaviour, cure) in CHECKS.items():
+    for name, (behaviour, change) in CHECKS.items():
         cured = results(runs[name], behaviour)
         plain = results(runs[f"loss-map-{behaviour}"], behaviour).filter(pl.col("loss") == 0.0)
         for latency_s in cured["latency_s"].unique().sort():
             pair = (plain.filter(latency_s=latency_s), cured.filter(latency_s=latency_s))
-            said = f"{_share(pair[0])} | {_share(pair[1])} | {_difference(*pair)}"
-            lines.append(f"| {behaviour}: {cure} | {latency_s:g} | {said} |")
+            cells = f"{_share(pair[0])} | {_share(pair[1])} | {_difference(*pair)}"
+            lines.append(f"| {behaviour}: {change} | {latency_s:g} | {cells} |")
     return lines
 
 
-def _cell_line(behaviour: str, one: pl.DataFrame, other: pl.DataFrame, loss: float, latency_s: float) -> str:
+def _cell_line(behaviour: str, independent: pl.DataFrame, bursts: pl.DataFrame, loss: float, latency_s: float) -> str:
     """A row of the table, "" if the cell was not run."""
-    here = ((pl.col("loss") - loss).abs() < 1e-9) & ((pl.col("latency_s") - latency_s).abs() < 1e-9)
-    first, second = one.filter(here), other.filter(here)
+    cell = ((pl.col("loss") - loss).abs() < 1e-9) & ((pl.col("latency_s") - latency_s).abs() < 1e-9)
+    first, second = independent.filter(cell), bursts.filter(cell)
     if not (len(first) and len(second)):
         return ""
     cells = f"{_share(first)} | {_share(second)} | {_difference(first, second)}"
     return f"| {behaviour} | {loss:g} | {latency_s:g} | {cells} |"
 
 
-def _share(of: pl.DataFrame) -> str:
+def _share(runs: pl.DataFrame) -> str:
     """Of one cell, with Wilson's interval."""
-    successes, n = int(of["success"].sum()), len(of)
+    successes, n = int(runs["success"].sum()), len(runs)
     low, high = binomial_interval(np.array([successes]), np.array([n]))
     return f"{successes} of {n} ({low[0]:.2f} to {high[0]:.2f})"
 
 
-def _mean(of: pl.DataFrame) -> str:
-    return f"{of['success'].mean():.2f}"
+def _mean(runs: pl.DataFrame) -> str:
+    return f"{runs['success'].mean():.2f}"
 
 
-def _difference(one: pl.DataFrame, other: pl.DataFrame) -> str:
+def _difference(first: pl.DataFrame, second: pl.DataFrame) -> str:
     """Of the shares, seed by seed, with the bootstrap's interval over seeds."""
-    found = difference(by_seed(one), by_seed(other))
-    low, high = found.mean_interval if np.isfinite(found.mean_interval.low) else Interval(found.mean, found.mean)
-    return f"{found.mean:+.2f} ({low:+.2f} to {high:+.2f})"
+    effect = difference(by_seed(first), by_seed(second))
+    low, high = effect.mean_interval if np.isfinite(effect.mean_interval.low) else Interval(effect.mean, effect.mean)
+    return f"{effect.mean:+.2f} ({low:+.2f} to {high:+.2f})"
 
 
-def by_seed(of: pl.DataFrame) -> Sample:
+def by_seed(runs: pl.DataFrame) -> Sample:
     """The share of each seed's runs that succeed."""
-    means = of.group_by("seed").agg(pl.col("success").cast(pl.Float64).mean()).sort("seed")
+    means = runs.group_by("seed").agg(pl.col("success").cast(pl.Float64).mean()).sort("seed")
     return number_sample(means["success"].to_numpy(), means["seed"].to_numpy().astype(np.int64))

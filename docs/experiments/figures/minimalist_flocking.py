@@ -32,7 +32,7 @@ LARGEST = {"aggregation_hop.max": "by one hop", "aggregation.max": "by clusters"
 COLUMNS = (*TIMES, *LARGEST, *(f"{name}.mean" for name in MOTION))
 EVERYWHERE = ("run", "point", "seed", COUNT, SEPARATION, LATERAL, REAR, "stop_time_s", "sim_time_s")
 RATE_HZ = 60
-DENSE, ONE = "equal density", "one arena"
+DENSE, SINGLE = "equal density", "one arena"
 
 
 def digested(_folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
@@ -42,17 +42,17 @@ def digested(_folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
 
 def times(runs: pl.DataFrame, name: str) -> Sample:
     """The times of a criterion; where it was not met by the run's end it lies beyond that."""
-    found = runs[name].to_numpy().astype(np.float64)
-    observed = np.isfinite(found)
+    time_s = runs[name].to_numpy().astype(np.float64)
+    observed = np.isfinite(time_s)
     ends_s = runs["sim_time_s"].to_numpy().astype(np.float64)
-    return time_sample(np.where(observed, found, ends_s), observed, runs["seed"].to_numpy())
+    return time_sample(np.where(observed, time_s, ends_s), observed, runs["seed"].to_numpy())
 
 
 def swarms(runs: Mapping[str, pl.DataFrame]) -> dict[tuple[str, int], pl.DataFrame]:
     """The runs of each series and number of robots; five robots have the same arena in both."""
     dense = pl.concat([runs["minimalist-small"], runs["minimalist-large"]], how="diagonal")
     arena = pl.concat([runs["minimalist-small"].filter(pl.col(COUNT) == 5), runs["minimalist-arena"]], how="diagonal")
-    tables = ((DENSE, dense), (ONE, arena))
+    tables = ((DENSE, dense), (SINGLE, arena))
     return {
         (series, n): table.filter(pl.col(COUNT) == n)
         for series, table in tables
@@ -69,13 +69,13 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     figure, groups = blank_figure(6.4, 4.4), swarms(runs)
     sizes = sorted({n for _, n in groups})
     color = dict(zip(sizes, ordered_colors(len(sizes)), strict=True))
-    for row, series in enumerate((DENSE, ONE)):
+    for row, series in enumerate((DENSE, SINGLE)):
         for column, share in enumerate((60, 80)):
-            place = (0.08 + 0.47 * column, 0.58 - 0.47 * row, 0.4, 0.34)
-            axes = plain_axes(figure, place, f"runs without {share} % in one flock, {series}")
-            for (of, n), table in groups.items():
+            box = (0.08 + 0.47 * column, 0.58 - 0.47 * row, 0.4, 0.34)
+            axes = plain_axes(figure, box, f"runs without {share} % in one flock, {series}")
+            for (group_series, n), table in groups.items():
                 for name, dashes in ((f"hop_{share}_s", "-"), (f"cluster_{share}_s", "--")):
-                    if of == series:
+                    if group_series == series:
                         time_s, waiting = curve(times(table, name))
                         axes.plot(
                             time_s, waiting, dashes, drawstyle="steps-post", color=color[n], lw=1.2, label=f"{n} robots"
@@ -99,11 +99,11 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
 
 def curve(sample: Sample) -> tuple[FloatArray, FloatArray]:
     """When the share of runs that wait falls, and what is left of it, up to the last run's end."""
-    found, end_s = kaplan_meier(sample), float(sample.value.max())
-    return np.array([1e-3, *found.time, end_s]), np.array([1.0, *found.survival, found.survival[-1]])
+    estimate, end_s = kaplan_meier(sample), float(sample.value.max())
+    return np.array([1e-3, *estimate.time, end_s]), np.array([1.0, *estimate.survival, estimate.survival[-1]])
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """All tables, and what the runs took."""
     groups, swarm, criteria = swarms(runs), ("", "N", "runs"), tuple(TIMES.values())
     thresholds, moving = ("separation, lateral, rear", "runs"), ("N", "", "near a wall", "m/s alone", "in a flock of 2")
@@ -116,14 +116,14 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
         ("Walls and motion, means (95 % interval)", (*moving, "of 3", "of 4 and more"), motion(runs)),
     )
     taken = cost(pl.concat([runs[name] for name in CAMPAIGNS[:3]], how="diagonal"))
-    return "\n\n".join((*(table(*of) for of in tables), taken))
+    return "\n\n".join((*(table(*content) for content in tables), taken))
 
 
 def quartiles(groups: Mapping[tuple[str, int], pl.DataFrame]) -> list[list[str]]:
     """Of each swarm and criterion."""
     return [
-        [series, str(n), str(len(of)), *(waits(times(of, name)) for name in TIMES)]
-        for (series, n), of in groups.items()
+        [series, str(n), str(len(group)), *(waits(times(group, name)) for name in TIMES)]
+        for (series, n), group in groups.items()
     ]
 
 
@@ -138,10 +138,10 @@ def chance(groups: Mapping[tuple[str, int], pl.DataFrame]) -> list[list[str]]:
         [
             series,
             str(n),
-            str(len(of)),
-            *(f"{100 * met_at_once(of, name):.1f} %" for name in TIMES),
+            str(len(group)),
+            *(f"{100 * met_at_once(group, name):.1f} %" for name in TIMES),
         ]
-        for (series, n), of in groups.items()
+        for (series, n), group in groups.items()
     ]
 
 
@@ -153,8 +153,8 @@ def met_at_once(runs: pl.DataFrame, name: str) -> float:
 def largest(groups: Mapping[tuple[str, int], pl.DataFrame]) -> list[list[str]]:
     """The largest flock that a run ever had, in robots: median over runs, and the largest of all."""
     rows: list[list[str]] = []
-    for (series, n), of in groups.items():
-        robots = [of[name].cast(pl.Float64).to_numpy() * n for name in LARGEST]
+    for (series, n), group in groups.items():
+        robots = [group[name].cast(pl.Float64).to_numpy() * n for name in LARGEST]
         rows.append([series, str(n), *(f"{np.median(most):.0f}, {np.max(most):.0f}" for most in robots)])
     return rows
 
@@ -173,7 +173,9 @@ def ratio(first: Sample, other: Sample) -> str:
         return "–"
     if np.isnan(medians[1]):
         return f"< {number_text(medians[0] / float(other.value.max()))}"
-    drawn_medians = [resampled_quantiles(of, draw_counts(len(of), at), 0.5) for at, of in enumerate((first, other))]
+    drawn_medians = [
+        resampled_quantiles(sample, draw_counts(len(sample), at), 0.5) for at, sample in enumerate((first, other))
+    ]
     if np.isinf(drawn_medians[0]).any():
         return number_text(medians[0] / medians[1])
     spread = drawn_medians[0] / np.maximum(drawn_medians[1], 1e-9)
@@ -184,9 +186,9 @@ def ratio(first: Sample, other: Sample) -> str:
 def by_thresholds(runs: pl.DataFrame) -> list[list[str]]:
     """Quartiles of five robots."""
     rows: list[list[str]] = []
-    for (separation, lateral, rear), of in runs.group_by(SEPARATION, LATERAL, REAR, maintain_order=True):
+    for (separation, lateral, rear), group in runs.group_by(SEPARATION, LATERAL, REAR, maintain_order=True):
         rows.append(
-            [f"{separation:g}, {lateral:g}, {rear:g}", str(len(of)), *(waits(times(of, name)) for name in TIMES)]
+            [f"{separation:g}, {lateral:g}, {rear:g}", str(len(group)), *(waits(times(group, name)) for name in TIMES)]
         )
     return sorted(rows)
 
@@ -195,10 +197,17 @@ def motion(runs: Mapping[str, pl.DataFrame]) -> list[list[str]]:
     """Share near walls, and the speed of flocks by size, with and without cohesion."""
     rows: list[list[str]] = []
     for name, rule in (("minimalist-motion", "all rules"), ("minimalist-apart", "no cohesion")):
-        for (n,), of in runs[name].group_by(COUNT, maintain_order=True):
-            means = (summary(number_sample(of[f"{what}.mean"].cast(pl.Float64).to_numpy())) for what in MOTION)
+        for (n,), group in runs[name].group_by(COUNT, maintain_order=True):
+            means = (summary(number_sample(group[f"{measure}.mean"].cast(pl.Float64).to_numpy())) for measure in MOTION)
             rows.append(
-                [str(n), rule, *(f"{number_text(of.mean)} ({interval_text(of.mean_interval)})" for of in means)]
+                [
+                    str(n),
+                    rule,
+                    *(
+                        f"{number_text(statistics.mean)} ({interval_text(statistics.mean_interval)})"
+                        for statistics in means
+                    ),
+                ]
             )
     return rows
 

@@ -40,8 +40,8 @@ def points(runs: pl.DataFrame) -> list[tuple[float, float, bool, pl.DataFrame]]:
     """Side and radius in m, whether the robots look, and the runs, by point."""
     groups = runs.group_by(ARENA, OBSTACLE, FAINT, maintain_order=True)
     return [
-        (side_m(size), float(radius), detection_threshold < BLIND, of)
-        for (size, radius, detection_threshold), of in groups
+        (side_m(size), float(radius), detection_threshold < BLIND, group)
+        for (size, radius, detection_threshold), group in groups
     ]
 
 
@@ -53,18 +53,18 @@ def mean_of(runs: pl.DataFrame, measure: str) -> Summary:
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     """Coverage, changes of side and deadlocks over the arena's side, a curve for each size of obstacle."""
     figure = blank_figure(7.2, 2.4)
-    found = points(runs["movement"])
-    radii = sorted({radius for _, radius, _, _ in found})
-    for place, measure in enumerate(SHOWN):
-        axes = plain_axes(figure, (0.05 + 0.325 * place, 0.18, 0.28, 0.68), MEASURES[measure])
+    results = points(runs["movement"])
+    radii = sorted({radius for _, radius, _, _ in results})
+    for column, measure in enumerate(SHOWN):
+        axes = plain_axes(figure, (0.05 + 0.325 * column, 0.18, 0.28, 0.68), MEASURES[measure])
         for radius, color in zip(radii, ordered_colors(len(radii)), strict=True):
-            curve = [(side, mean_of(of, measure)) for side, r, looks, of in found if r == radius and looks]
+            curve = [(side, mean_of(group, measure)) for side, r, looks, group in results if r == radius and looks]
             _curve(axes, curve, color, f"obstacles of {2.0 * radius:g} m", "-")
-        blind = [(side, mean_of(of, measure)) for side, r, looks, of in found if r == radii[0] and not looks]
+        blind = [(side, mean_of(group, measure)) for side, r, looks, group in results if r == radii[0] and not looks]
         if measure != "oscillation.final":  # who goes straight has no side
             _curve(axes, blind, ACCENT, f"without looking, {2.0 * radii[0]:g} m", ":")
         axes.set_ylim(bottom=0.0)
-        axes.set_xticks(sorted({side for side, _, _, _ in found}))
+        axes.set_xticks(sorted({side for side, _, _, _ in results}))
         axes.set_xlabel("side of the arena, m", fontsize=TEXT_PT, color=SOFT)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.axes[1].legend(handles, labels, fontsize=SMALL_PT, frameon=False, loc="upper right")
@@ -73,25 +73,25 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
 
 def _curve(axes: Any, curve: Sequence[tuple[float, Summary]], color: Any, label: str, line: str) -> None:
     sides = [side for side, _ in curve]
-    axes.vlines(sides, *np.array([of.mean_interval for _, of in curve]).T, color=color, lw=0.9)
-    axes.plot(sides, [of.mean for _, of in curve], f"o{line}", color=color, ms=3.2, lw=1.0, label=label)
+    axes.vlines(sides, *np.array([statistics.mean_interval for _, statistics in curve]).T, color=color, lw=0.9)
+    axes.plot(sides, [statistics.mean for _, statistics in curve], f"o{line}", color=color, ms=3.2, lw=1.0, label=label)
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """Every measure at every point, those that look and then those that do not."""
     head = ("arena, m", "obstacles, m", "robots", *MEASURES.values())
     rows: list[Sequence[str]] = [head, ("---",) * len(head)]
     for looking in (True, False):
-        for side, radius, looks, of in points(runs["movement"]):
+        for side, radius, looks, group in points(runs["movement"]):
             if looks == looking:
                 who = "look" if looks else "do not look"
-                found = [mean_of(of, name) for name in MEASURES]
+                summaries = [mean_of(group, name) for name in MEASURES]
                 rows.append(
                     (
                         f"{side:g} x {side:g}",
                         f"{2.0 * radius:g}",
                         who,
-                        *(_within(one.mean, one.mean_interval) for one in found),
+                        *(_within(statistics.mean, statistics.mean_interval) for statistics in summaries),
                     )
                 )
     table = "\n".join(f"| {' | '.join(row)} |" for row in rows)

@@ -24,7 +24,7 @@ from docs.experiments.figures._pso import (
 )
 from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, Look
 
-__all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "told"]
+__all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "numbers"]
 
 CAMPAIGNS = (
     "pso-range",
@@ -67,22 +67,22 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     return figure
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """Tables by range, by loss and by latency, the latter two at each reach; robots alone where there is no model."""
     by_range = against_model(runs["pso-range"], runs["pso-range-model"], "radio.range_m", "range, m")
     parts = [f"By radio range:\n\n{by_range}"]
     for name, column, called in (("pso-loss", "radio.loss", "loss"), ("pso-latency", "radio.latency_s", "latency, s")):
         for range_m, _, reach in REACHES:
             kinds = [kind for kind in KINDS if f"{name}{kind.suffix}" in runs]
-            some = [at(runs[f"{name}{kind.suffix}"], radio__range_m=range_m) for kind in kinds]
-            of = f"By {called}, radio to {reach}"
-            if len(some) > 1 and kinds[1].suffix == "-model":
-                parts.append(f"{of}:\n\n{against_model(some[0], some[1], column, called)}")
+            selected = [at(runs[f"{name}{kind.suffix}"], radio__range_m=range_m) for kind in kinds]
+            title = f"By {called}, radio to {reach}"
+            if len(selected) > 1 and kinds[1].suffix == "-model":
+                parts.append(f"{title}:\n\n{against_model(selected[0], selected[1], column, called)}")
             else:
-                parts.append(f"{of}, robots:\n\n{variants_table(some[0], {column: called})}")
+                parts.append(f"{title}, robots:\n\n{variants_table(selected[0], {column: called})}")
     if "pso-latency-places" in runs:
-        places = {"radio.range_m": "range, m", "radio.latency_s": "latency, s"}
-        parts.append(f"Robots that know their places:\n\n{variants_table(runs['pso-latency-places'], places)}")
+        columns = {"radio.range_m": "range, m", "radio.latency_s": "latency, s"}
+        parts.append(f"Robots that know their places:\n\n{variants_table(runs['pso-latency-places'], columns)}")
     ring = {RING: "on the ring (0: all)", KEEPS: "keeps what it received", "radio.loss": "loss"}
     parts.append(f"Neighbours on a ring, robots:\n\n{variants_table(runs['pso-ring'], ring)}")
     parts.append(f"Inertia, all hear all, robots:\n\n{variants_table(runs['pso-inertia'], {INERTIA: 'w, a = b = 2'})}")
@@ -93,8 +93,8 @@ def _by_range(shares: Any, soon: Any, runs: Mapping[str, pl.DataFrame]) -> None:
     """How many find the light, and how soon."""
     ranges = values(runs["pso-range"], "radio.range_m")
     for kind in KINDS[:2]:
-        some = [at(runs[f"pso-range{kind.suffix}"], radio__range_m=range_m) for range_m in ranges]
-        half, first = ([times(each, response) for each in some] for response in (HALF, FIRST))
+        by_range = [at(runs[f"pso-range{kind.suffix}"], radio__range_m=range_m) for range_m in ranges]
+        half, first = ([times(each, response) for each in by_range] for response in (HALF, FIRST))
         share_curve(shares, ranges, half, kind.look)
         few: Look = {**kind.look, "ls": ":", "lw": 0.9, "ms": 2, "label": f"{kind.who}: the first"}
         share_curve(shares, ranges, first, few)
@@ -118,15 +118,15 @@ def _by_radio(axes: Any, runs: Mapping[str, pl.DataFrame], campaign: str, column
     """How soon half of them are there; dashed: with a radio to 2 m."""
     for kind in KINDS:
         for range_m, style, reach in REACHES if f"{campaign}{kind.suffix}" in runs else ():
-            some = at(runs[f"{campaign}{kind.suffix}"], radio__range_m=range_m)
+            selected = at(runs[f"{campaign}{kind.suffix}"], radio__range_m=range_m)
             look: Look = {**kind.look, "ls": style, "label": f"{kind.who}, {reach}"}
-            time_curve(axes, *times_by(some, column), look)
+            time_curve(axes, *times_by(selected, column), look)
 
 
 def _on_ring(axes: Any, runs: pl.DataFrame) -> None:
     """How soon half of them are there; dashed: what was received counts until the next update."""
     for count, who, color in ((0, "all", CURVE), (10, "ring", ACCENT)):
         for keeps, style, how in ((True, "-", "kept"), (False, "--", "asked anew")):
-            some = runs.filter((pl.col(RING) == count) & (pl.col(KEEPS) == keeps))
+            selected = runs.filter((pl.col(RING) == count) & (pl.col(KEEPS) == keeps))
             look: Look = {**Kind("", f"{who}, {how}", color).look, "ls": style}
-            time_curve(axes, *times_by(some, "radio.loss"), look)
+            time_curve(axes, *times_by(selected, "radio.loss"), look)

@@ -9,7 +9,7 @@ from docs.experiments.figures._pso import Kind, at, digested, ladder, steps_tabl
 from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SOFT, TEXT_PT, plain_axes
 from swarmwire.metrics.pictures.report.page import blank_figure
 
-__all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "told"]
+__all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "numbers"]
 
 CAMPAIGNS = ("pso-why", "pso-why-model", "pso-noise")
 COLUMNS = ("find_time_s",)
@@ -37,18 +37,18 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     figure = blank_figure(5.0, 2.6)
     axes = plain_axes(figure, (0.32, 0.17, 0.65, 0.72), "radio to 2 m: mean time to half there (at most 300 s)")
     axes.set_xlabel("s", fontsize=TEXT_PT, color=SOFT)
-    ladder(axes, [(label, some, KINDS["e-puck" not in label].color) for label, some in steps(runs)])
+    ladder(axes, [(label, step_runs, KINDS["e-puck" not in label].color) for label, step_runs in steps(runs)])
     return figure
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """Tables: what sets robots apart, and noise."""
-    of = steps(runs)
+    robot_steps = steps(runs)
     noisy = runs["pso-noise"].with_columns(pl.when(pl.col(BODY) == "epuck").then(0.05).otherwise(0.3).alias("noise"))
     noise = {"noise": "noise of a photocell", KEEPS: "keeps what it received", AGAIN: "measured again within, m"}
     return "\n\n".join(
         (
-            f"Robots and particles with a radio to 2 m:\n\n{steps_table(of, of[0][1])}",
+            f"Robots and particles with a radio to 2 m:\n\n{steps_table(robot_steps, robot_steps[0][1])}",
             f"Noisy photocells:\n\n{variants_table(noisy, noise)}",
         )
     )

@@ -62,14 +62,14 @@ def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
     columns = [pl.col("run", "point", "seed"), _disabled(runs), pl.col(TIMES[campaign]).alias("time_s")]
     if AGENT in runs.columns:
         columns.append(pl.col(AGENT).str.split(":").list.last().alias("agent"))
-    kept = runs.select(*columns, "ended", "sim_time_s", "timing_wall_s")
+    digest = runs.select(*columns, "ended", "sim_time_s", "timing_wall_s")
     tables = [at.select("run", area="coverage")]
     if campaign == SEARCH:
-        there = series.filter(pl.col("target_best") <= NEAR_M)
-        tables.append(there.group_by("run").agg(first_s=pl.col("tick").min() / RATES_HZ[campaign]))
+        near = series.filter(pl.col("target_best") <= NEAR_M)
+        tables.append(near.group_by("run").agg(first_s=pl.col("tick").min() / RATES_HZ[campaign]))
     for table in tables:
-        kept = kept.join(table.collect(), on="run", how="left", maintain_order="left")
-    return kept
+        digest = digest.join(table.collect(), on="run", how="left", maintain_order="left")
+    return digest
 
 
 def _campaign(runs: pl.DataFrame) -> str:
@@ -78,7 +78,9 @@ def _campaign(runs: pl.DataFrame) -> str:
 
 def _disabled(runs: pl.DataFrame) -> pl.Series:
     events = [json.loads(text) for text in runs["events"]]
-    return pl.Series("disabled", [of[0]["robots"]["share"] if of else 0.0 for of in events], pl.Float64)
+    return pl.Series(
+        "disabled", [run_events[0]["robots"]["share"] if run_events else 0.0 for run_events in events], pl.Float64
+    )
 
 
 def efficiency(runs: Mapping[str, pl.DataFrame], reading: Reading) -> tuple[FloatArray, FloatArray]:
@@ -86,11 +88,15 @@ def efficiency(runs: Mapping[str, pl.DataFrame], reading: Reading) -> tuple[Floa
 
     A time that a run did not come to counts as the run's length, which makes it look better than it was.
     """
-    of = runs[reading.campaign].filter(pl.col("ended") != "failed")
-    of = of.filter(pl.col("agent") == reading.agent) if reading.agent else of
+    selected = runs[reading.campaign].filter(pl.col("ended") != "failed")
+    selected = selected.filter(pl.col("agent") == reading.agent) if reading.agent else selected
     value = pl.col(reading.column)
     value = 1.0 / value.fill_null(pl.col("sim_time_s")).clip(reading.floor_s) if reading.is_time else value
-    table = of.select("disabled", "seed", value=value).pivot("seed", index="disabled", values="value").sort("disabled")
+    table = (
+        selected.select("disabled", "seed", value=value)
+        .pivot("seed", index="disabled", values="value")
+        .sort("disabled")
+    )
     share = table["disabled"].to_numpy()
     return share, relative_to_unharmed(share, table.drop("disabled").to_numpy().astype(np.float64))
 
@@ -112,16 +118,16 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
 
 
 def _draw_reading(axes: Any, share: FloatArray, table: FloatArray, label: str, color: Any) -> None:
-    found = [summary(number_sample(row)) for row in table]
-    axes.vlines(share, *np.array([of.mean_interval for of in found]).T, color=color, lw=0.9)
-    axes.plot(share, [of.mean for of in found], "o", color=color, ms=3.2, label=label)
+    summaries = [summary(number_sample(row)) for row in table]
+    axes.vlines(share, *np.array([statistics.mean_interval for statistics in summaries]).T, color=color, lw=0.9)
+    axes.plot(share, [statistics.mean for statistics in summaries], "o", color=color, ms=3.2, label=label)
     fits = degradation(share, table)
     if fits is not None:
         fine = np.linspace(0.0, float(share[-1]), 51)
         axes.plot(fine, fits.better.evaluate(fine), color=color, lw=1.0)
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """The fits of each reading, what is left at 5 % and 50 %, and how many runs did not finish."""
     head = (
         "efficiency",
@@ -145,12 +151,12 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
 
 def _left(share: FloatArray, table: FloatArray, at: float) -> str:
     """Mean relative efficiency at a share, with the interval of its difference, seed by seed, to none disabled."""
-    here = np.flatnonzero(np.isclose(share, at))
-    if not len(here):
+    rows = np.flatnonzero(np.isclose(share, at))
+    if not len(rows):
         return "–"
-    found = difference(number_sample(table[0]), number_sample(table[here[0]]))
-    low, high = found.mean_interval
-    return f"{1.0 + found.mean:.3f} ({1.0 + low:.3f} to {1.0 + high:.3f})"
+    effect = difference(number_sample(table[0]), number_sample(table[rows[0]]))
+    low, high = effect.mean_interval
+    return f"{1.0 + effect.mean:.3f} ({1.0 + low:.3f} to {1.0 + high:.3f})"
 
 
 def _fits(fits: Degradation | None) -> tuple[str, str, str]:
@@ -168,6 +174,6 @@ def _slope(fit: Fit) -> str:
 def _unfinished(runs: Mapping[str, pl.DataFrame], reading: Reading) -> str:
     if not reading.is_time:
         return "–"
-    of = runs[reading.campaign]
-    of = of.filter(pl.col("agent") == reading.agent) if reading.agent else of
-    return f"{of[reading.column].null_count()} of {len(of)}"
+    selected = runs[reading.campaign]
+    selected = selected.filter(pl.col("agent") == reading.agent) if reading.agent else selected
+    return f"{selected[reading.column].null_count()} of {len(selected)}"

@@ -31,8 +31,8 @@ AGENT, COUNT, BOUNDARY, PARTS = (
     "arena.boundary",
     "robots.crowd.params",
 )
-RULE, CURE = "ThresholdRule", "SmoothedAvoidance"
-LOOKS = {RULE: ("the article's rule", ACCENT), CURE: ("smoothed", CURVE)}
+RULE, SMOOTHED = "ThresholdRule", "SmoothedAvoidance"
+LOOKS = {RULE: ("the article's rule", ACCENT), SMOOTHED: ("smoothed", CURVE)}
 PANELS = (
     ("changes of direction a robot-minute", pl.col("reversals.final") + pl.col("oscillation.final")),
     ("share of the robots deadlocked", pl.col("deadlocked.mean")),
@@ -42,8 +42,8 @@ PANELS = (
 
 def sample_of(runs: pl.DataFrame, value: pl.Expr, agent: str) -> Sample:
     """A value by seed of the runs of one agent."""
-    of = runs.filter(pl.col(AGENT).str.ends_with(f":{agent}"))
-    return number_sample(of.select(value.cast(pl.Float64)).to_series().to_numpy(), of["seed"].to_numpy())
+    selected = runs.filter(pl.col(AGENT).str.ends_with(f":{agent}"))
+    return number_sample(selected.select(value.cast(pl.Float64)).to_series().to_numpy(), selected["seed"].to_numpy())
 
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
@@ -51,12 +51,16 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     figure = blank_figure(7.2, 2.4)
     corridor = runs["article-rule"]
     counts = corridor[COUNT].unique().sort().to_list()
-    for place, (title, value) in enumerate(PANELS):
-        axes = plain_axes(figure, (0.05 + 0.325 * place, 0.18, 0.28, 0.68), title)
+    for column, (title, value) in enumerate(PANELS):
+        axes = plain_axes(figure, (0.05 + 0.325 * column, 0.18, 0.28, 0.68), title)
         for agent, (label, color) in LOOKS.items():
-            of = [summary(sample_of(corridor.filter(pl.col(COUNT) == count), value, agent)) for count in counts]
-            axes.vlines(counts, *np.array([one.mean_interval for one in of]).T, color=color, lw=0.9)
-            axes.plot(counts, [one.mean for one in of], "o-", color=color, ms=3.2, lw=1.0, label=label)
+            summaries = [summary(sample_of(corridor.filter(pl.col(COUNT) == count), value, agent)) for count in counts]
+            axes.vlines(
+                counts, *np.array([statistics.mean_interval for statistics in summaries]).T, color=color, lw=0.9
+            )
+            axes.plot(
+                counts, [statistics.mean for statistics in summaries], "o-", color=color, ms=3.2, lw=1.0, label=label
+            )
         axes.set_xscale("log", base=2)
         axes.set_xticks(counts, [str(count) for count in counts])
         axes.set_ylim(bottom=0.0)
@@ -65,42 +69,42 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     return figure
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """The corridor by number of robots, the paired differences, the small cases, and the parts of the cure."""
     corridor = runs["article-rule"]
-    many = ", ".join(f"{name} {of['seed'].n_unique()}" for name, of in runs.items())
+    many = ", ".join(f"{name} {group['seed'].n_unique()}" for name, group in runs.items())
     return "\n\n".join((f"Runs a point: {many}.", _by_count(corridor), _paired(corridor), _cases(runs), _parts(runs)))
 
 
 def _by_count(runs: pl.DataFrame) -> str:
     rows: list[Sequence[str]] = []
-    for (count,), of in runs.group_by(COUNT, maintain_order=True):
-        rows += [(str(count), label, *_measures(of, agent)) for agent, (label, _) in LOOKS.items()]
+    for (count,), group in runs.group_by(COUNT, maintain_order=True):
+        rows += [(str(count), label, *_measures(group, agent)) for agent, (label, _) in LOOKS.items()]
     return _table(("robots", "rule", *MEASURES.values()), rows)
 
 
 def _paired(runs: pl.DataFrame) -> str:
     """Smoothed less the article's, seed by seed."""
     rows: list[Sequence[str]] = []
-    for (count,), of in runs.group_by(COUNT, maintain_order=True):
-        found = [difference(sample_of(of, value, RULE), sample_of(of, value, CURE)) for _, value in PANELS]
-        rows.append((str(count), *(_within(one.mean, one.mean_interval, "+") for one in found)))
+    for (count,), group in runs.group_by(COUNT, maintain_order=True):
+        effects = [difference(sample_of(group, value, RULE), sample_of(group, value, SMOOTHED)) for _, value in PANELS]
+        rows.append((str(count), *(_within(effect.mean, effect.mean_interval, "+") for effect in effects)))
     return _table(("robots", *(f"{title}: smoothed less the article's" for title, _ in PANELS)), rows)
 
 
 def _cases(runs: Mapping[str, pl.DataFrame]) -> str:
     rows: list[Sequence[str]] = []
     for campaign, case in (("article-pair", "two head on"), ("article-three", "one against two")):
-        for (boundary,), of in runs[campaign].group_by(BOUNDARY, maintain_order=True):
+        for (boundary,), group in runs[campaign].group_by(BOUNDARY, maintain_order=True):
             where = {"open": "in the open", "walls": "in the corridor"}[str(boundary)]
-            rows += [(f"{case}, {where}", label, *_measures(of, agent)) for agent, (label, _) in LOOKS.items()]
+            rows += [(f"{case}, {where}", label, *_measures(group, agent)) for agent, (label, _) in LOOKS.items()]
     return _table(("case", "rule", *MEASURES.values()), rows)
 
 
 def _parts(runs: Mapping[str, pl.DataFrame]) -> str:
     names = ("field alone", "and low-pass", "and hysteresis", "and both")
     groups = runs["article-parts"].group_by(PARTS, maintain_order=True)
-    rows = [(name, *_summaries(of)) for name, (_, of) in zip(names, groups, strict=False)]
+    rows = [(name, *_summaries(group)) for name, (_, group) in zip(names, groups, strict=False)]
     return _table(("16 robots", *MEASURES.values()), rows)
 
 
@@ -109,8 +113,8 @@ def _measures(runs: pl.DataFrame, agent: str) -> list[str]:
 
 
 def _summaries(runs: pl.DataFrame) -> list[str]:
-    of = [summary(number_sample(runs[name].cast(pl.Float64).to_numpy())) for name in MEASURES]
-    return [_within(one.mean, one.mean_interval) for one in of]
+    summaries = [summary(number_sample(runs[name].cast(pl.Float64).to_numpy())) for name in MEASURES]
+    return [_within(statistics.mean, statistics.mean_interval) for statistics in summaries]
 
 
 def _within(mean: float, interval: Interval, sign: str = "") -> str:

@@ -19,7 +19,7 @@ NOISE = "robots.particles.params.noise_rad"
 # Share of a run that is left out.
 BURN_IN = {"vicsek": 1 / 3, "vicsek-long": 2 / 3, "vicsek-all": 0.1, "vicsek-512": 1 / 3}
 # Mean orders by another hand: a program in C++ written apart from this project's code, burn-in 20,000 steps or more.
-KNOWN = {"vicsek": {1.0: 0.954, 3.0: 0.621}, "vicsek-512": {0.24: 0.645, 0.28: 0.534, 0.32: 0.378}}
+OTHER_PROGRAM = {"vicsek": {1.0: 0.954, 3.0: 0.621}, "vicsek-512": {0.24: 0.645, 0.28: 0.534, 0.32: 0.378}}
 ROBOTS = 100
 LARGE = "N = 512, density 1, 0.1 a step"
 HEAD = ("case", "noise [rad]", "runs", "order", "expected", "by")
@@ -52,8 +52,8 @@ def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
     series = pl.scan_parquet(folder / "series" / "*.parquet").select("run", "tick", pl.col("order").cast(pl.Float64))
     late = series.join(runs.lazy().select("run", "ticks"), on="run").filter(pl.col("tick") >= burn_in * pl.col("ticks"))
     order = late.group_by("run").agg(pl.col("order").mean().alias("order.late")).collect()
-    kept = ("run", "point", "seed", NOISE, "ended", "sim_time_s", *COLUMNS, "timing_wall_s")
-    return runs.join(order, on="run", how="left", maintain_order="left").select(kept)
+    columns = ("run", "point", "seed", NOISE, "ended", "sim_time_s", *COLUMNS, "timing_wall_s")
+    return runs.join(order, on="run", how="left", maintain_order="left").select(columns)
 
 
 def all_to_all(noise_rad: FloatArray | float, robots: int | None = None) -> Any:
@@ -75,8 +75,17 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     )
     noise, values = _by_noise(runs["vicsek"])
     means(near, noise, values, color=CURVE, label="here")
-    known = KNOWN["vicsek"]
-    near.plot(list(known), list(known.values()), "x", color=ACCENT, ms=6, mew=1.2, label="another program", zorder=5)
+    other_program = OTHER_PROGRAM["vicsek"]
+    near.plot(
+        list(other_program),
+        list(other_program.values()),
+        "x",
+        color=ACCENT,
+        ms=6,
+        mew=1.2,
+        label="another program",
+        zorder=5,
+    )
     near.axhline(np.sqrt(np.pi / (4.0 * ROBOTS)), color=SOFT, lw=0.7, ls="--", label="headings at random")
     legend(near, loc="upper right")  # clear of the dashed line
     noise, values = _by_noise(runs["vicsek-all"])
@@ -90,7 +99,7 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     return figure
 
 
-def told(runs: Mapping[str, pl.DataFrame]) -> str:
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """Every noise with its order and what it should be, where that is known."""
     rows = _rows(runs)
     alike = [row for row in rows if row.expected is not None and row.case != LARGE]
@@ -101,25 +110,25 @@ def told(runs: Mapping[str, pl.DataFrame]) -> str:
 
 
 def _rows(runs: Mapping[str, pl.DataFrame]) -> list[Row]:
-    found: list[Row] = []
+    rows: list[Row] = []
     for campaign, case in (("vicsek", "N = 100, L = 5"), ("vicsek-long", "the same, long")):
         for noise, value in zip(*_by_noise(runs[campaign]), strict=True):
-            known = KNOWN["vicsek"].get(noise)
-            found.append(Row(case, f"{noise:g}", value, known, "" if known is None else "another program"))
+            expected = OTHER_PROGRAM["vicsek"].get(noise)
+            rows.append(Row(case, f"{noise:g}", value, expected, "" if expected is None else "another program"))
     for noise, value in zip(*_by_noise(runs["vicsek-all"]), strict=True):
-        found.append(Row("all hear all", f"{noise:g}", value, float(all_to_all(noise, ROBOTS)), "formula, with 1/N"))
+        rows.append(Row("all hear all", f"{noise:g}", value, float(all_to_all(noise, ROBOTS)), "formula, with 1/N"))
     for noise, value in zip(*_by_noise(runs["vicsek-512"]), strict=True):
         turn = round(noise / (2.0 * np.pi), 2)
-        known = KNOWN["vicsek-512"].get(turn)
-        found.append(Row(LARGE, f"{turn:g} x 2π", value, known, "another program: moves by the new direction"))
-    return found
+        expected = OTHER_PROGRAM["vicsek-512"].get(turn)
+        rows.append(Row(LARGE, f"{turn:g} x 2π", value, expected, "another program: moves by the new direction"))
+    return rows
 
 
 def _by_noise(runs: pl.DataFrame) -> tuple[list[float], list[FloatArray]]:
     """Noises, rising, and the late orders of each."""
     noise: list[float] = []
     values: list[FloatArray] = []
-    for (of,), at in runs.sort(NOISE, "seed").group_by(NOISE, maintain_order=True):
-        noise.append(float(str(of)))
+    for (key,), at in runs.sort(NOISE, "seed").group_by(NOISE, maintain_order=True):
+        noise.append(float(str(key)))
         values.append(at["order.late"].drop_nulls().to_numpy())
     return noise, values

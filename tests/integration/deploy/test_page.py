@@ -206,7 +206,7 @@ def test_page_stops_the_run_at_the_second_click_and_stays_until_closed(run):
         assert page.is_disabled("#play")
         assert page.inner_text("#play").strip() == "Ended"
         assert not page.query_selector_all("#transport button:enabled, .acts button:enabled")
-        assert "the run is over" in page.inner_text("#said")
+        assert "the run is over" in page.inner_text("#notice")
         page.reload()
         page.wait_for_selector("#state.over")
     assert process.wait(60) == 130  # as the run was interrupted

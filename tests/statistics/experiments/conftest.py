@@ -34,7 +34,7 @@ def draw(runs):
     return figure
 
 
-def told(runs):
+def numbers(runs):
     received = runs["two-losses"].group_by("radio.loss", maintain_order=True).agg(pl.col("radio.link_pdr").mean())
     table = received.select("radio.loss", "radio.link_pdr")
     rows = "".join(f"| {loss:g} | {pdr:.2f} |\\n" for loss, pdr in table.iter_rows())

@@ -13,7 +13,7 @@ from docs.experiments.figures._pso import mean_distances
 from docs.experiments.figures.dense import covered, frozen
 from docs.experiments.figures.loss_map import BEHAVIOURS, CHECKS, results, shares
 from docs.experiments.figures.movement import BLIND, FAINT, points
-from docs.experiments.figures.threshold import BOUNDARY, CURE, PARTS, RULE, sample_of
+from docs.experiments.figures.threshold import BOUNDARY, PARTS, RULE, SMOOTHED, sample_of
 from docs.experiments.figures.threshold import COUNT as THRESHOLD_COUNT
 from docs.experiments.figures.vicsek import all_to_all
 from swarmwire.comms.base.arrays import FloatArray
@@ -300,7 +300,7 @@ def test_resilience_falls_with_dead_robots_and_is_drawn(tmp_path):
         assert table[0].mean() == pytest.approx(1.0)
         assert table[-1].mean() < 0.9
     assert len(experiment.draw(runs).axes) == 3
-    assert experiment.told(runs).count("\n") == 1 + len(experiment.module.READINGS)
+    assert experiment.numbers(runs).count("\n") == 1 + len(experiment.module.READINGS)
 
 
 def test_resilience_efficiency_counts_unfinished_runs_at_their_length():
@@ -330,8 +330,8 @@ def test_threshold_rule_deadlocks_in_the_corridor_unless_replaced(tmp_path: Path
     for runs in (crowd, pair):
         assert sample_of(runs, deadlocked, RULE).value.mean() > 0.1
         assert sample_of(runs, swings, RULE).value.mean() > 1.0
-        assert sample_of(runs, deadlocked, CURE).value.mean() < 0.05
-        assert sample_of(runs, swings, CURE).value.max() == 0.0, "the cure never drives backwards"
+        assert sample_of(runs, deadlocked, SMOOTHED).value.mean() < 0.05
+        assert sample_of(runs, swings, SMOOTHED).value.max() == 0.0, "the cure never drives backwards"
     assert len(done.figure.axes) == 3
     assert done.told.count("the article's rule") == 1 + 4
 
@@ -425,7 +425,7 @@ def test_loss_map_radios_lose_equally_in_the_mean(corners):
 def test_loss_map_is_drawn_with_all_cells(corners):
     experiment = find_experiment("loss-map", HERE)
     assert len(experiment.draw(corners).axes) == 7  # with the scale
-    lines = experiment.told(corners).splitlines()
+    lines = experiment.numbers(corners).splitlines()
     assert sum(line.startswith("| flocking | ") for line in lines) == 5  # four corners, and the whole map
     assert sum("sent 3 s before" in line for line in lines) == 2
     assert set(CHECKS) <= set(corners)

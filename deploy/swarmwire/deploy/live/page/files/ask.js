@@ -1,5 +1,5 @@
 // Asks the run for something; what it refuses is said in its own words.
-import { say } from "./said.js";
+import { showNotice } from "./notice.js";
 
 let before = Promise.resolve();
 
@@ -34,9 +34,9 @@ async function give(order) {
     });
     if (answer.ok) return (await answer.json()).event;
     const { detail } = await answer.json();
-    say(detail);
+    showNotice(detail);
   } catch {
-    say("the page's process does not answer: it has ended");
+    showNotice("the page's process does not answer: it has ended");
   }
   return null;
 }

@@ -1,7 +1,7 @@
 // Kill and revive, jam, cut in halves and heal.
 import { end, happen } from "./ask.js";
 import { map } from "./map.js";
-import { say } from "./said.js";
+import { showNotice } from "./notice.js";
 
 const LOUDER_DB = 15; // a jammer than a robot, unless somebody says otherwise
 const by = (id) => document.getElementById(id);
@@ -22,14 +22,14 @@ export function breaking() {
   by("heal").onclick = () => endAll("partition");
   by("unjam").onclick = () => endAll("jammer");
   by("jam").onclick = () =>
-    at ? happen({ do: "jammer", at, power_dbm: Number(by("power").value) }) : say("nothing was seen of the swarm yet");
+    at ? happen({ do: "jammer", at, power_dbm: Number(by("power").value) }) : showNotice("nothing was seen of the swarm yet");
   by("place").onclick = () => { small.forget(); show(); };
 
   function show() {
     at = small.see(status.places, status.centre);
-    const where = small.place ? "at" : "centre";
+    const where = small.position ? "at" : "centre";
     by("place").textContent = at ? `${where} ${at.map((value) => value.toFixed(1)).join(", ")} m` : "";
-    by("place").title = small.place ? "a click takes the swarm's centre again" : "a click on the map takes another place";
+    by("place").title = small.position ? "a click takes the swarm's centre again" : "a click on the map takes another place";
   }
 
   return {

@@ -9,14 +9,14 @@ export function happenings() {
   let shown = "";
   return {
     see(status) {
-      const told = [status.events, status.who, status.state === "over"];
-      const text = JSON.stringify(told);
+      const content = [status.events, status.who, status.state === "over"];
+      const text = JSON.stringify(content);
       if (text === shown) return; // a list that is drawn anew takes the button from under the pointer
       shown = text;
-      const place = document.getElementById("events");
+      const list = document.getElementById("events");
       const items = ordered(status.events ?? []).map((event) => item(event, status.who?.[event.number], status.state === "over"));
       if (!items.length) items.push(Object.assign(document.createElement("li"), { className: "none", textContent: "nothing has happened yet" }));
-      place.replaceChildren(...items);
+      list.replaceChildren(...items);
     },
   };
 }
@@ -25,7 +25,7 @@ export function happenings() {
 function ordered(events) {
   const rank = (event) => (event.tick ?? (event.given ? Infinity : -1));
   const real = events.filter((event) => !(event.given && event.over && event.tick === null)); // not taken back in time
-  return real.sort((one, other) => rank(other) - rank(one) || (rank(one) < 0 ? one.number - other.number : other.number - one.number));
+  return real.sort((first, second) => rank(second) - rank(first) || (rank(first) < 0 ? first.number - second.number : second.number - first.number));
 }
 
 function item(event, who, ended) {
@@ -35,10 +35,10 @@ function item(event, who, ended) {
   line.className = event.over || !begun ? "over" : "";
   line.title = event.text;
   line.append(Object.assign(document.createElement("span"), { className: "quiet", textContent: when }));
-  const what = line.appendChild(document.createElement("span"));
-  what.textContent = words(event, begun ? who : undefined);
-  if (event.given) what.append(" ", Object.assign(document.createElement("span"), { className: "hand", textContent: "by hand" }));
-  if (event.over && begun) what.append(" ", Object.assign(document.createElement("span"), { className: "quiet", textContent: "over" }));
+  const description = line.appendChild(document.createElement("span"));
+  description.textContent = words(event, begun ? who : undefined);
+  if (event.given) description.append(" ", Object.assign(document.createElement("span"), { className: "hand", textContent: "by hand" }));
+  if (event.over && begun) description.append(" ", Object.assign(document.createElement("span"), { className: "quiet", textContent: "over" }));
   if (LASTING.includes(event.do) && begun && !event.over && !ended) {
     const button = line.appendChild(Object.assign(document.createElement("button"), { textContent: "end", title: "undo it" }));
     button.onclick = () => end(event.number);

@@ -10,15 +10,15 @@ export function health() {
       if (runners === null || runners === undefined) {
         by("runners").textContent = "no runners: all agents are in the world's process";
       } else {
-        const told = Object.entries(runners)
+        const states = Object.entries(runners)
           .filter(([name, count]) => count || name === "ready" || name === "lost")
           .map(([name, count]) => ({ name: name.replaceAll("_", " "), count }));
-        told.forEach(({ name, count }, at) => {
+        states.forEach(({ name, count }, at) => {
           const item = document.createElement("span");
           const number = item.appendChild(document.createElement("b"));
           number.textContent = count;
           number.className = count && !FINE.includes(name) ? "bad" : "";
-          item.append(` ${name}${at < told.length - 1 ? " · " : ""}`);
+          item.append(` ${name}${at < states.length - 1 ? " · " : ""}`);
           by("runners").append(item);
         });
       }

@@ -10,12 +10,12 @@ export function map(svg, chosen) {
     return element;
   };
   let robots, mark, radius;
-  let place = null; // null: the swarm's centre
+  let position = null; // null: the swarm's centre
 
   svg.addEventListener("click", (event) => {
     const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
-    place = [Number(at.x.toFixed(2)), Number((-at.y).toFixed(2))];
-    chosen(place);
+    position = [Number(at.x.toFixed(2)), Number((-at.y).toFixed(2))];
+    chosen(position);
   });
 
   return {
@@ -25,27 +25,27 @@ export function map(svg, chosen) {
       svg.replaceChildren();
       svg.setAttribute("viewBox", `${-side / 2} ${-side / 2} ${side} ${side}`);
       add("rect", { class: "wall", x: -width / 2, y: -height / 2, width, height });
-      for (const one of facts.obstacles) {
-        if (one.corners.length) add("polygon", { class: "block", points: one.corners.map(([x, y]) => `${x},${-y}`).join(" ") });
-        else add("circle", { class: "block", cx: one.x, cy: -one.y, r: one.radius });
+      for (const obstacle of facts.obstacles) {
+        if (obstacle.corners.length) add("polygon", { class: "block", points: obstacle.corners.map(([x, y]) => `${x},${-y}`).join(" ") });
+        else add("circle", { class: "block", cx: obstacle.x, cy: -obstacle.y, r: obstacle.radius });
       }
       robots = add("g", {});
       mark = add("path", { class: "place" });
     },
-    see(places, centre) {
-      while (robots.children.length > places.length) robots.lastChild.remove();
-      while (robots.children.length < places.length) add("path", {}, robots);
-      places.forEach(([x, y, alive], at) => {
+    see(poses, centre) {
+      while (robots.children.length > poses.length) robots.lastChild.remove();
+      while (robots.children.length < poses.length) add("path", {}, robots);
+      poses.forEach(([x, y, alive], at) => {
         const dot = robots.children[at];
         dot.setAttribute("transform", `translate(${x} ${-y})`);
         dot.setAttribute("d", alive ? DISC(radius) : CROSS(radius));
         dot.setAttribute("class", alive ? "robot" : "dead");
       });
-      const at = place ?? centre, arm = radius * 3;
+      const at = position ?? centre, arm = radius * 3;
       mark.setAttribute("d", at ? `M${at[0] - arm} ${-at[1]}h${2 * arm}M${at[0]} ${-at[1] - arm}v${2 * arm}` : "");
       return at;
     },
-    get place() { return place; },
-    forget() { place = null; },
+    get position() { return position; },
+    forget() { position = null; },
   };
 }

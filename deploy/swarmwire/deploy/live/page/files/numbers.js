@@ -1,9 +1,9 @@
 // What is measured, each with its curve; what is undefined in this run is not shown.
 import { sparkline } from "./sparkline.js";
 
-const KEPT = 240;
+const HISTORY_LENGTH = 240;
 const FIRST = ["link_pdr", "components", "order", "largest_component", "alive", "tick_ms"];
-const OWN = [
+const STATUS_SERIES = [
   { name: "link_pdr", unit: "%", bounds: [0, 1] },
   { name: "alive", unit: "", bounds: [0, null] },
   { name: "tick_ms", unit: "ms", bounds: [0, null] },
@@ -22,7 +22,7 @@ export function numbers() {
     const label = box.appendChild(document.createElement("dt"));
     label.textContent = label.title = NAMES[series.name] ?? series.name.replaceAll("_", " ");
     const value = box.appendChild(document.createElement("dd"));
-    const line = sparkline(KEPT);
+    const line = sparkline(HISTORY_LENGTH);
     box.append(line.svg);
     box.hidden = true;
     (FIRST.includes(series.name) ? by("numbers") : by("rest")).append(box);
@@ -37,8 +37,8 @@ export function numbers() {
     begin(facts) {
       for (const id of ["numbers", "rest"]) by(id).replaceChildren(), (by(id).className = "tiles");
       tiles.clear();
-      const known = new Map([...OWN, ...facts.series].map((series) => [series.name, series]));
-      for (const name of [...FIRST, ...known.keys()]) if (known.has(name) && !tiles.has(name)) tile(known.get(name));
+      const allSeries = new Map([...STATUS_SERIES, ...facts.series].map((series) => [series.name, series]));
+      for (const name of [...FIRST, ...allSeries.keys()]) if (allSeries.has(name) && !tiles.has(name)) tile(allSeries.get(name));
       for (const values of facts.history) take(values);
       lastTick = null;
     },

@@ -4,7 +4,7 @@ import { happenings } from "./happenings.js";
 import { health } from "./health.js";
 import { numbers } from "./numbers.js";
 import { radio } from "./radio.js";
-import { say } from "./said.js";
+import { showNotice } from "./notice.js";
 import { transport } from "./transport.js";
 import { viewer } from "./viewer.js";
 
@@ -27,7 +27,7 @@ news.addEventListener("status", (event) => {
   for (const part of parts) part.see?.(status);
   if (status.state === "over" && !over) {
     over = true; // the connection stays: it tells that somebody still looks
-    say("the run is over; its page stays until you close it", true);
+    showNotice("the run is over; its page stays until you close it", true);
   }
 });
 

@@ -10,50 +10,50 @@ const KEYS = [
 const WHY = { range_m: "follows from how strong signals are" };
 
 export function radio() {
-  const place = document.getElementById("radio");
+  const container = document.getElementById("radio");
   const rows = new Map();
   let facts = null;
 
-  for (const of of KEYS) {
-    const row = place.appendChild(document.createElement("label"));
+  for (const slider of KEYS) {
+    const row = container.appendChild(document.createElement("label"));
     row.className = "slide";
-    row.append(Object.assign(document.createElement("span"), { textContent: of.name }));
-    const input = row.appendChild(Object.assign(document.createElement("input"), { type: "range", id: `radio-${of.name}`, step: of.step }));
+    row.append(Object.assign(document.createElement("span"), { textContent: slider.name }));
+    const input = row.appendChild(Object.assign(document.createElement("input"), { type: "range", id: `radio-${slider.name}`, step: slider.step }));
     const output = row.appendChild(document.createElement("output"));
     const state = { row, input, output, held: false, awaited: null };
-    input.oninput = () => { state.held = true; output.textContent = of.show(Number(input.value)); };
+    input.oninput = () => { state.held = true; output.textContent = slider.show(Number(input.value)); };
     input.onchange = async () => {
       const to = Number(input.value);
-      const number = await askSoon(of.key, { do: "event", event: { do: "ramp", what: `radio.${of.key}`, to } });
+      const number = await askSoon(slider.key, { do: "event", event: { do: "ramp", what: `radio.${slider.key}`, to } });
       if (to !== Number(input.value)) return; // it was moved on
       state.awaited = number === null ? null : to;
       state.held = false;
     };
-    rows.set(of, state);
+    rows.set(slider, state);
   }
 
   return {
-    begin(told) { facts = told; },
+    begin(newFacts) { facts = newFacts; },
     see(status) {
-      const known = status.radio;
-      document.getElementById("radio-why").textContent = known ? "" : "(this scenario has no radio)";
-      for (const [of, state] of rows) {
-        const now = known?.[of.key];
-        const there = typeof now === "number" && status.state !== "over";
-        state.row.hidden = Boolean(of.signals) && typeof now !== "number";
-        state.input.disabled = !there;
-        state.row.classList.toggle("off", !there);
-        state.row.title = there ? `radio.${of.key}` : known ? WHY[of.key] ?? "this radio has no such number" : "this scenario has no radio";
+      const numbers = status.radio;
+      document.getElementById("radio-why").textContent = numbers ? "" : "(this scenario has no radio)";
+      for (const [slider, state] of rows) {
+        const now = numbers?.[slider.key];
+        const available = typeof now === "number" && status.state !== "over";
+        state.row.hidden = Boolean(slider.signals) && typeof now !== "number";
+        state.input.disabled = !available;
+        state.row.classList.toggle("off", !available);
+        state.row.title = available ? `radio.${slider.key}` : numbers ? WHY[slider.key] ?? "this radio has no such number" : "this scenario has no radio";
         if (typeof now !== "number") {
-          state.output.textContent = known ? "by signal" : "–";
+          state.output.textContent = numbers ? "by signal" : "–";
           continue;
         }
-        if (state.awaited !== null && Math.abs(state.awaited - now) > of.step / 2 && status.state === "paused") continue; // the next tick brings it
+        if (state.awaited !== null && Math.abs(state.awaited - now) > slider.step / 2 && status.state === "paused") continue; // the next tick brings it
         state.awaited = null;
         if (state.held) continue;
-        Object.assign(state.input, { min: Math.min(of.least, now), max: of.most(now, facts) });
+        Object.assign(state.input, { min: Math.min(slider.least, now), max: slider.most(now, facts) });
         state.input.value = now;
-        state.output.textContent = of.show(now);
+        state.output.textContent = slider.show(now);
       }
     },
   };

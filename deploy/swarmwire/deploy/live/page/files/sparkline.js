@@ -18,9 +18,9 @@ export function sparkline(most) {
       if (values.length > most) values.shift();
     },
     draw(bounds) {
-      const known = values.filter((value) => value !== null);
-      const least = bounds[0] ?? Math.min(...known);
-      const largest = Math.max(bounds[1] ?? -Infinity, ...known);
+      const defined = values.filter((value) => value !== null);
+      const least = bounds[0] ?? Math.min(...defined);
+      const largest = Math.max(bounds[1] ?? -Infinity, ...defined);
       const span = largest - least || 1;
       const x = (at) => (values.length < 2 ? 0 : (at / (values.length - 1)) * WIDTH);
       const y = (value) => HEIGHT - 1 - ((value - least) / span) * (HEIGHT - 2);

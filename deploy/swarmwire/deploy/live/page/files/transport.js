@@ -18,9 +18,9 @@ export function transport() {
   const step = (n) => ask({ do: "step", n });
   const faster = (by) => {
     speed.value = Math.min(Math.max(Number(speed.value) + by, 0), fastest);
-    asked();
+    sendSpeed();
   };
-  const asked = () => {
+  const sendSpeed = () => {
     held = false;
     ask({ do: "speed", factor: SPEEDS[speed.value] });
   };
@@ -28,7 +28,7 @@ export function transport() {
   by("step").onclick = () => step(1);
   by("step10").onclick = () => step(10);
   speed.oninput = () => { held = true; by("speed-now").textContent = words(SPEEDS[speed.value]); };
-  speed.onchange = asked;
+  speed.onchange = sendSpeed;
   by("stop").onclick = (event) => certainly(event.target, () => ask({ do: "stop" }));
 
   document.addEventListener("click", (event) => { // a button that was clicked does not keep the space bar
