@@ -79,6 +79,8 @@ def started(*arguments: str | Path) -> subprocess.Popen[str]:
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
     first = process.stdout.readline()
+    if first.startswith("compiling"):
+        first = process.stdout.readline()
     assert "robots" in first, (first, process.stderr.read() if process.stderr and not first else "")
     return process
 

@@ -51,7 +51,7 @@ def test_run_is_found_until_it_ends(tmp_path, runtime):
     assert live_runs() == []
     run = announced(tmp_path / "a", "r1")
     [found] = live_runs()
-    assert found == LiveRun("r1", "unixsock-stream//nowhere", os.getpid(), static(2).name, str(tmp_path / "a"))
+    assert found == LiveRun("unixsock-stream//nowhere", "r1", os.getpid(), static(2).name, str(tmp_path / "a"))
     assert find_run(None) == find_run("r1") == find_run("r") == found
     assert find_run(str(tmp_path / "a")).run == "r1"
     assert run.end(None) == {}
@@ -61,7 +61,7 @@ def test_run_is_found_until_it_ends(tmp_path, runtime):
 
 def test_killed_runs_and_files_that_are_no_run_are_removed(tmp_path, runtime):
     folder = runs_folder()
-    killed = LiveRun("r1", "e", NOBODY, "s", "f")
+    killed = LiveRun("e", "r1", NOBODY, "s", "f")
     (folder / "r1.json").write_text(json.dumps(vars(killed)))
     (folder / "r2.json").write_text("[]")
     (folder / ".aside-r3.json").write_text("")
