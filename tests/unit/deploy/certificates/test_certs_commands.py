@@ -7,7 +7,7 @@ import pytest
 
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.wire.access_control import RunAccess
-from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
+from swarmwire.deploy.robots.certificates.folder import begin_authority, issue, revoke
 from swarmwire.deploy.robots.certificates.member import member
 from swarmwire.deploy.robots.certificates.register import certificate_request
 from tests.support.deploy.certificates import DatedFakeClock
@@ -135,9 +135,10 @@ def certified(folder: Path, clock) -> Path:
     return folder
 
 
-def test_member_reads_rights_and_files_from_a_folder(certified):
+def test_member_reads_rights_and_files_from_a_folder(certified, clock):
+    revoke(certified, "gate", clock)
     world = member("world", certs=certified, revoked=("b",))
-    assert world.access == RunAccess(("a",), routers=("gate",), revoked=("b",))
+    assert world.access == RunAccess(("a",), routers=("gate",), revoked=("gate", "b"))
     assert world.network.certificate == certified / "world.pem"
     assert world.warning(BEYOND) is None
 
