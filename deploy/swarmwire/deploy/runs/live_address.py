@@ -75,9 +75,9 @@ def _has_listener(path: Path) -> bool:
 class Live:
     """The address of a run that observers can join."""
 
-    endpoint: str  # endpoint for observers
-    run: str  # id of the run
-    pid: int  # process of the world
+    endpoint: str  #: endpoint for observers
+    run: str  #: id of the run
+    pid: int  #: process of the world
 
 
 def write_live(live: Live, folder: Path) -> None:
@@ -119,8 +119,8 @@ def process_exists(pid: int) -> bool:
 class LiveRun(Live):
     """A live run in the list of this machine's runs."""
 
-    scenario: str  # name of the scenario
-    folder: str  # run folder
+    scenario: str  #: name of the scenario
+    folder: str  #: run folder
 
 
 class Announcement(Observer):
