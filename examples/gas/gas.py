@@ -62,8 +62,12 @@ class Sealer(CustomActuator):
 
     def act(self, tick: int, rows: IntArray, values: FloatArray) -> None:
         arena, robot = self.at(rows)
-        x, y = self.scene.state[arena, robot, 0], self.scene.state[arena, robot, 1]
-        near = portable.hypot(x - self.x_m, y - self.y_m) <= self.arm_m
-        work = np.where(near, np.clip(values[:, 0], 0.0, 1.0), 0.0) * self.rate_per_s * self.scene.tick_s
+        position_m: FloatArray = self.scene.state[arena, robot]
+        distance_m = portable.hypot(position_m[:, 0] - self.x_m, position_m[:, 1] - self.y_m)
+        work = (
+            np.where(distance_m <= self.arm_m, np.clip(values[:, 0], 0.0, 1.0), 0.0)
+            * self.rate_per_s
+            * self.scene.tick_s
+        )
         np.subtract.at(self.leak.strength, arena, work)
         np.maximum(self.leak.strength, 0.0, out=self.leak.strength)

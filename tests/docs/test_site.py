@@ -133,7 +133,7 @@ def test_behaviours_have_a_page_that_names_their_parameters(site):
         own = page_of(re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower())
         assert f'href="behaviours/{own}.html#{name.lower()}"' in page(site, "behaviours")
         named = code(site, f"behaviours/{own}")
-        assert {f'agent = "swarmwire.agent.behaviours:{name}"', *parameters_of(kind)} <= named
+        assert {*parameters_of(kind)} <= named
 
 
 def test_radio_page_names_every_preset_with_its_source(site):

@@ -266,10 +266,8 @@ def _scale(fastest_mps: FloatArray, limit_mps: float) -> FloatArray:
     return np.minimum(limit_mps / np.maximum(fastest_mps, TINY), 1.0)
 
 
-def _sine_and_cosine(angle: FloatArray) -> tuple[Float32Array, Float32Array]:
-    """Return sine and cosine in the precision of observations, which takes a quarter of the time."""
-    narrow = angle.astype(np.float32)
-    return portable.sin(narrow), portable.cos(narrow)
+def _sine_and_cosine(angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+    return portable.sin(angle), portable.cos(angle)
 
 
 def _measured(received: Packets[Message], measure: str, index: IntArray) -> list[FloatArray | Float32Array]:

@@ -250,7 +250,7 @@ def test_avoidance_is_the_same_in_a_mirror(value: list[float], safe_m: float) ->
 
 OFTEN = {"update_every_ticks": 3, "tell_before_ticks": 1}
 RING = {"ring_count": 7, "ring_index": [0, 1, 2, 3, 4, 5, 6]}
-INDEPENDENCE: list[tuple[type[VectorAgent], Trial]] = [
+INDEPENDENCE: list[tuple[type[VectorAgent[Any]], Trial]] = [
     *((kind, Trial(ticks=30)) for kind in (Aggregation, Coverage, RandomWalk)),
     *((Avoidance, Trial(seed=seed, body=body)) for seed in (1, 2) for body in ("epuck", "footbot")),
     (BeaconAvoidance, Trial(seed=1, ticks=25)),

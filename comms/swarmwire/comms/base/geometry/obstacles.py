@@ -58,7 +58,8 @@ def obstacle_arrays(arenas: tuple[tuple[Obstacle, ...], ...]) -> Obstacles:
                 continue
             corners = o.corners_m
             centre = portable.ordered_sum(corners.T) / len(corners)
-            polygons.append((*centre, portable.hypot(*(corners - centre).T).max()))
+            spokes_m: FloatArray = corners - centre
+            polygons.append((*centre, portable.hypot(spokes_m[:, 0], spokes_m[:, 1]).max()))
             sides.append(sides_of(corners))
             side_start.append(side_start[-1] + len(corners))
         circle_start.append(len(circles))
