@@ -2,17 +2,20 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from typing import Any
+
 import numpy as np
 
 from docs.pictures.radio.sheet import legend, line_color, panels, say, write
 from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.base.sentinels import UNDER_WAY
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.impairments import Bursts
-from swarmwire.comms.radio.links import Links
+from swarmwire.comms.radio.links import RECEIVED
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
-from swarmwire.comms.radio.stages.losses import LossChain
+from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
+from swarmwire.comms.radio.stages.losses import NO_TRACE_NS, LossChain, frame_fate
 from swarmwire.metrics.real.radio_fit.losses import expected_runs
 
 BURSTS = Bursts(bad_s=0.5, good_s=2.0)
@@ -50,11 +53,18 @@ def losses(packets: int) -> BoolArray:
     sender, receiver = np.divmod(np.arange(links), ROBOTS)
     lost = np.empty((links, packets), np.bool_)
     for n in range(packets):
-        sequence, at_ns = np.full(links, n), np.full(links, round(n * INTERVAL_S * NS_PER_S))
-        table = Links.under_way(sequence, sender, receiver, sequence, at_ns, 0)
-        chain.decide(table, ROBOTS, keys, count_only=False)
-        lost[:, n] = table.fate != UNDER_WAY
+        at_ns = round(n * INTERVAL_S * NS_PER_S)
+        lose(lost[:, n], chain.losses(NO_TRACE_NS, at_ns, links), keys[0], sender, receiver, n, at_ns)
     return lost
+
+
+@njit()
+def lose(lost: Any, losses: Any, key: int, sender: Any, receiver: Any, sequence: int, at_ns: int) -> None:
+    """Write whether a packet of each link is lost, (links,)."""
+    for i in range(len(lost)):
+        s, r = sender[i], receiver[i]
+        frame = ReceivedFrame(key, s, r, s, r, sequence, 0, False, at_ns, at_ns)
+        lost[i] = frame_fate(losses, frame) != RECEIVED
 
 
 def run_lengths(lost: BoolArray) -> np.ndarray:

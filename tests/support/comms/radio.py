@@ -13,6 +13,7 @@ from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.geometry.shapes import Obstacle
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.radio import config
@@ -22,12 +23,12 @@ from swarmwire.comms.radio.config.phy import Access, Bodies, Fading, ReceiverNoi
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
-from swarmwire.comms.radio.stages.losses import LossChain
+from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
+from swarmwire.comms.radio.stages.losses import NO_TRACE_NS, LossChain, frame_fate
 from swarmwire.comms.radio.traces import LinkTrace, LinkTraces, Quantity, link_trace
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 
@@ -236,9 +237,23 @@ class BurstLinks:
 
     def lost(self, sender: IntArray, receiver: IntArray, sequence: IntArray, at_ns: IntArray) -> BoolArray:
         """Whether each packet (k,) is lost, between robot rows."""
-        links = Links.under_way(np.zeros(len(sender), np.int64), sender, receiver, sequence, at_ns, 0)
-        LossChain([self._loss]).decide(links, self._robots, self._keys, count_only=False)
-        return links.fate == Fate.BURST
+        first_ns, by_time = int(at_ns.min(initial=2**62)), np.argsort(at_ns, kind="stable")
+        losses = LossChain([self._loss]).losses(NO_TRACE_NS, first_ns, len(sender))
+        fate = np.empty(len(sender), np.int64)
+        fates_of_frames(fate, by_time, losses, self._keys, self._robots, sender, receiver, sequence, at_ns)
+        return fate == Fate.BURST
+
+
+@njit()
+def fates_of_frames(
+    fate: Any, order: Any, losses: Any, keys: Any, robots: int, sender: Any, receiver: Any, sequence: Any, at_ns: Any
+) -> None:
+    """Set the fate of each data frame (k,) between robot rows, tested in this order."""
+    for k in order:
+        key, first = keys[sender[k] // robots], sender[k] // robots * robots
+        s, r = sender[k] - first, receiver[k] - first
+        frame = ReceivedFrame(key, sender[k], receiver[k], s, r, sequence[k], 0, False, at_ns[k], at_ns[k])
+        fate[k] = frame_fate(losses, frame)
 
 
 def trace_of(quantity: Quantity, rows: Sequence[Row]) -> LinkTrace:

@@ -3,29 +3,32 @@
 The world's loop calls `step` and then `send` in each tick. What these call, and in which files:
 
     RadioMedium.send                 medium.py                 packets of a tick go to the senders' radios
-    |  SendTimes.in_tick             send_times.py             the moment of each robot within the tick
+    |  SendTimes.of_senders          send_times.py             the moment of each within the tick
     |  RadioModel.accept             model.py                  of the unit disk or of the PHY:
-    |  |  Admission.admit            transmissions.py          a row of `Transmissions` each; UNDER_WAY: no fate yet
+    |  |  admit                      transmissions.py          a row of type PACKET each; UNDER_WAY: no fate yet
     |  +- unit disk
-    |  |     TxQueues.accept         unit_disk/tx_queue.py     the time on air, or a refusal, is known at once
+    |  |     enqueue                 unit_disk/tx_queue.py     the time on air, or a refusal, is known at once
     |  +- PHY
-    |        PacketTable.add         phy/packets.py            packets wait for their events
-    |  PacketCounters.count_sent     counters.py
+    |        PacketTable.accept      phy/packets.py            packets wait for their events
 
     RadioMedium.step                 medium.py                 time passes up to the start of the tick
-    |  RadioModel.pass_time          model.py                  packets, and their links with fates
+    |  RadioModel.pass_time          model.py                  appends links with fates:
     |  +- unit disk
     |  |     UnitDisk.pass_time      unit_disk/model.py
-    |  |     TxQueues.pop_due        unit_disk/tx_queue.py     packets that go on air
-    |  |     Channel.decide          unit_disk/model.py        the fates of these packets:
-    |  |     links_in_range          unit_disk/neighbours.py   their receivers in range
-    |  |     Links.with_remainders   links.py                  a row per packet and receiver, UNDER_WAY
-    |  |     Stage.decide            stages/stage.py           of each stage in stages/chain.py, in order:
-    |  |        LineOfSight, BodiesBlock, Disrupted            stages/blocking.py
-    |  |        LossStage, ReceptionStage                      stages/losses.py
-    |  |        Measurement                                    stages/measurements.py
-    |  |        TraceDelay                                     stages/trace.py
-    |  |        Latency, VaryingDelay, PropagationDelay        stages/delays.py
+    |  |     find_neighbours         unit_disk/neighbours.py   the robots in range of each other
+    |  |     decide                  unit_disk/model.py        one walk over the receivers of the packets that
+    |  |     leave_queue             unit_disk/tx_queue.py     go on air, or are refused; for each receiver:
+    |  |     fate_before_reception   stages/chain.py
+    |  |        is_out_of_sight, is_behind_bodies, disrupted_fate   stages/blocking.py
+    |  |        loss_fate            stages/losses.py          the first loss that ends it:
+    |  |           fixed_loss        stages/loss.py
+    |  |           burst_loss        stages/burst_loss.py
+    |  |           trace_loss        stages/trace.py
+    |  |     after_reception         stages/chain.py           of a packet that is received:
+    |  |        measured_range_m, measured_bearing_rad, measured_rssi_dbm   stages/measurements.py
+    |  |        trace_delay_ns       stages/trace.py
+    |  |        latency_ns, frame_delay_ns, propagation_delay_ns   stages/delays.py
+    |  |     fill_remainder          links.py                  a row for the receivers out of range
     |  +- PHY
     |        SinrPhy.pass_time       phy/model.py
     |        run_until               phy/mac.py                events in the order of time:
@@ -42,9 +45,8 @@ The world's loop calls `step` and then `send` in each tick. What these call, and
     |           send_ack             phy/mac.py                the receiver acknowledges the frame
     |           ack_timed_out        phy/mac.py                no acknowledgement: retry, or end the packet
     |           record_last_attempt  phy/results.py            a unicast packet ends with this fate
-    |        links_of_rows           phy/packets.py            these rows as links
-    |        chain_after_reception   stages/chain.py           measurements and delays, as above
-    |  OpenLinks.add                 links.py                  stored until their fates are final
+    |        append_results          phy/packets.py            these rows as packets and links
+    |        pass_received           phy/model.py              `after_reception` of each, as above
     |  RadioModel.disrupt            model.py                  only while robots are dead or radios off
     |  final_by                      results.py                results of links whose fates are final by now
     |  Liveness.apply                liveness.py               disruption of the new tick

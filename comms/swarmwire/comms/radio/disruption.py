@@ -5,9 +5,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
-from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
-from swarmwire.comms.robot.packets import Fate
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.sentinels import NO_ROBOT
 
 
 class Jammers(NamedTuple):
@@ -121,30 +120,28 @@ class Disruption:
             separated |= (side[sender] == 1) & (side[receiver] == 2)
         return separated
 
-    def end_links(self, fate: AnyArray, sender: IntArray, receiver: IntArray) -> None:
-        """Set the fates (k,) of links between robot rows that are UNDER_WAY and that the disruption ends; in place.
-
-        RECEIVER_DEAD before BLACKOUT before PARTITIONED. Senders that are dead or off end packets at their queue.
-        """
-        if not self.is_active:
-            return
-        under_way = fate == UNDER_WAY
-        for ends, reason in (
-            (self.separates(sender, receiver), Fate.PARTITIONED),
-            (~self.radio_on[receiver], Fate.BLACKOUT),
-            (~self.alive[receiver], Fate.RECEIVER_DEAD),
-        ):
-            fate[under_way & ends] = reason
-
     def connects(self, a: IntArray, b: IntArray) -> BoolArray:
         """Return True for each pair of robot rows whose radios are on and that no partition separates, (k,)."""
         return self.radio_on[a] & self.radio_on[b] & ~self.separates(a, b) & ~self.separates(b, a)
 
 
-class ActiveDisruption(Disruption):
-    """The disruption that the parts of a medium share; it changes by `update` alone, and so caches its properties."""
+class Cuts(NamedTuple):
+    """Columns of a `Disruption` as input of kernels."""
 
-    __slots__ = ("_has_outages", "_is_active")
+    alive: BoolArray
+    radio_on: BoolArray
+    sides: IntArray
+    one_way: IntArray
+
+
+class ActiveDisruption(Disruption):
+    """The disruption that the parts of a medium share; it changes by `update` alone, and so caches its properties.
+
+    Attributes:
+        cuts: the columns that end links.
+    """
+
+    __slots__ = ("_has_outages", "_is_active", "cuts")
 
     @classmethod
     def none(cls, rows: int) -> Self:
@@ -160,6 +157,7 @@ class ActiveDisruption(Disruption):
         self.alive = alive
         self._has_outages = super().has_outages
         self._is_active = super().is_active
+        self.cuts = Cuts(alive, self.radio_on, self.sides, self.one_way)
 
     @property
     def has_outages(self) -> bool:

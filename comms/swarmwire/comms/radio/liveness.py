@@ -4,10 +4,9 @@
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, IntArray, Table
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.transmissions import Transmissions
 
 
 class LivenessHistory:
@@ -17,38 +16,33 @@ class LivenessHistory:
 
     Attributes:
         epoch: the current epoch.
-        any_dead: True if a robot was dead in any epoch of the history.
+        first_epoch: the first one that is needed.
+        alive: robots alive in each epoch from `first_epoch` on, (epochs, rows).
     """
 
     def __init__(self, rows: int) -> None:
-        self.epoch, self.any_dead = 0, False
-        self._alive: dict[int, BoolArray] = {0: np.ones(rows, np.bool_)}
+        self.epoch = self.first_epoch = 0
+        self.alive: BoolArray = np.ones((1, rows), np.bool_)
+
+    @property
+    def any_dead(self) -> bool:
+        """True if a robot was dead in any of these epochs."""
+        return not self.alive.all()
 
     def record(self, alive: BoolArray) -> None:
         """Begin an epoch with the robots `alive` (rows,), if they are not those of the current one."""
-        if not np.array_equal(alive, self._alive[self.epoch]):
+        if not np.array_equal(alive, self.alive[-1]):
             self.epoch += 1
-            self._alive[self.epoch] = alive.copy()
-            self._update()
+            self.alive = np.concatenate([self.alive, alive[None]])
 
     def intended(self, epoch: IntArray, receiver: IntArray) -> BoolArray:
         """Return True for each robot row `receiver` that was alive in its `epoch`, (k,)."""
-        is_intended = np.ones(len(receiver), np.bool_)
-        for number, alive in self._alive.items():
-            if not alive.all():
-                in_epoch = epoch == number
-                is_intended[in_epoch] = alive[receiver[in_epoch]]
-        return is_intended
+        return np.asarray(self.alive[epoch - self.first_epoch, receiver])
 
     def drop_unused(self, queued: IntArray) -> None:
-        """Drop the epochs in which no queued packet was sent; `queued` holds the epochs of these packets."""
-        if len(self._alive) > 1:
-            needed = {self.epoch, *np.unique(queued).tolist()}
-            self._alive = {number: alive for number, alive in self._alive.items() if number in needed}
-            self._update()
-
-    def _update(self) -> None:
-        self.any_dead = not all(alive.all() for alive in self._alive.values())
+        """Drop the epochs before those in which queued packets were sent; `queued` holds the epochs of these."""
+        needed = int(queued.min(initial=self.epoch))
+        self.alive, self.first_epoch = self.alive[needed - self.first_epoch :], needed
 
 
 class Liveness:
@@ -114,6 +108,6 @@ class Liveness:
         """Return True if any robot row `sender` (k,) is in an arena that has ended."""
         return self._any_ended and bool(self._has_ended[sender].any())
 
-    def in_running_arenas(self, packets: Transmissions) -> Transmissions:
-        """Return the packets that were sent in arenas that still run."""
-        return packets.split(self._has_ended[packets.sender])[1]
+    def in_running_arenas(self, packets: Table) -> Table:
+        """Return the packets, of type PACKET, that were sent in arenas that still run."""
+        return packets[~self._has_ended[packets["sender"]]]

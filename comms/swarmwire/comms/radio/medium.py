@@ -6,10 +6,11 @@ is final, and counts the fates.
 
 from functools import partial, reduce
 from operator import add
+from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray, Table
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT
@@ -18,14 +19,14 @@ from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.counters import PacketCounters
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.links import RECEIVED, Links, OpenLinks
+from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.liveness import Liveness
 from swarmwire.comms.radio.model import RadioModel
 from swarmwire.comms.radio.phy.model import SinrPhy
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.send_times import SendTimes
-from swarmwire.comms.radio.transmissions import Transmissions, first_without_receiver
+from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.radio.unit_disk.model import UnitDisk
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, ReceivedPackets, SentPackets, TxStatuses
 
@@ -33,26 +34,26 @@ from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, ReceivedPackets,
 MANY_LINKS = 4096
 
 
-def keep_link_order(links: Links, first: int, rows: int) -> None:
+def keep_link_order(packets: Table, links: Table, first: int, rows: int) -> None:
     """Delay rows of `links` from `first` on so that packets of one link arrive in the order in which they were sent.
 
-    In place. The open links of the medium contain all receptions still to come, so no further state is needed. A
+    In place. The links of the medium contain all receptions still to come, so no further state is needed. A
     reception ended by a disruption delays nothing. `rows` is the number of robots of all arenas; rows before `first`
     have been delayed already, and do not change.
     """
-    received = np.flatnonzero((links.fate == RECEIVED) & (links.receiver != NO_ROBOT))
-    link = links.sender[received] * rows + links.receiver[received]
+    received = np.flatnonzero((links["fate"] == RECEIVED) & (links["receiver"] != NO_ROBOT))
+    link = links["sender"][received].astype(np.int64) * rows + links["receiver"][received]
     # Sequence numbers of a sender rise in the order of time on air.
-    order = received[np.lexsort((links.sequence[received], link))]
-    _delay(links.sender, links.receiver, links.final_at_ns, order, first)
+    order = received[np.lexsort((packets["sequence"][links["packet"][received]], link))]
+    _delay(links, order, first)
 
 
 @njit()
-def _delay(sender: AnyArray, receiver: AnyArray, final_at_ns: AnyArray, order: AnyArray, first: int):
+def _delay(links: Any, order: AnyArray, first: int):
     for i in range(1, len(order)):
-        previous, row = order[i - 1], order[i]
-        if row >= first and sender[row] == sender[previous] and receiver[row] == receiver[previous]:
-            final_at_ns[row] = max(final_at_ns[row], final_at_ns[previous])
+        previous, link = links[order[i - 1]], links[order[i]]
+        if order[i] >= first and link.sender == previous.sender and link.receiver == previous.receiver:
+            link.final_at_ns = max(link.final_at_ns, previous.final_at_ns)
 
 
 def _check(context: ChannelContext) -> None:
@@ -110,16 +111,16 @@ class RadioMedium:
         self._liveness, self._threads = Liveness(context), context.threads
         period_ticks = np.ones(context.robots, np.int64) if act_every_ticks is None else act_every_ticks
         self._send_times = SendTimes(radio.send_offset, context.keys, period_ticks, rate_hz)
-        self._model: RadioModel = SinrPhy(context) if radio.is_phy else UnitDisk(context)
+        self._packets, self._links = Transmissions(), Links()
+        self._model: RadioModel = (SinrPhy if radio.is_phy else UnitDisk)(context, self._packets, self._links)
         self._counters = PacketCounters(len(context.keys), context.robots)
         self._now_ns = 0
         self._parts: list[Results] = []  # results within the current tick
         self._tx_status: list[TxStatuses] = []  # statuses of the current tick that `advance` returned
         self._reported_ns = 0  # `advance` has returned the receptions up to then
         self._next_ns = NEVER_NS  # time of the next reception for `advance`; 0: unknown, NEVER_NS: none
-        self._nothing = ReceivedPackets.none(radio.measures.columns)
-        self._no_links = Links.none(len(radio.measures.columns))
-        self._open = OpenLinks(Transmissions.none(), self._no_links)
+        self._measures = radio.measures.columns
+        self._nothing = ReceivedPackets.none(self._measures)
 
     def step(
         self, start_ns: int, pose: FloatArray, disruption: Disruption | None = None, radio: Radio | None = None
@@ -145,16 +146,21 @@ class RadioMedium:
         if disruption is not None:
             liveness.set_pending(disruption)
         if liveness.has_outages:
-            self._add_links(*self._model.disrupt(start_ns, liveness.pending, liveness.history))
+            first_new = len(self._links)
+            self._model.disrupt(start_ns, liveness.pending, liveness.history)
+            self._follow_links(first_new)
             self._end_receptions(start_ns, liveness.pending)
-        tx_status = TxStatuses.joined([*self._tx_status, self._model.tx_status(liveness.present)])
-        self._tx_status = []
-        liveness.history.drop_unused(self._model.queued.epoch)
-        final = self._threads.start(partial(self._pop_final, start_ns, self.radio), self._open.link_count)
+        tx_status = self._model.tx_status(liveness.present)
+        if self._tx_status or len(tx_status):
+            tx_status, self._tx_status = TxStatuses.joined([*self._tx_status, tx_status]), []
+        if len(liveness.history.alive) > 1:
+            liveness.history.drop_unused(self._model.queued["epoch"])
+        final = self._threads.start(partial(self._pop_final, start_ns), len(self._links))
         self._set_poses(pose, radio or self.radio)
         edges = self._model.edges(pose, liveness.present) if self._computes_graph else results.NO_EDGES
-        joined = Results.joined([*self._parts, final()])
-        self._parts = []
+        joined = final()
+        if self._parts:
+            joined, self._parts = Results.joined([*self._parts, joined]), []
         return Results(joined.received, joined.finished, joined.departed, tx_status, joined.tally, edges)
 
     def send(self, start_ns: int, tick: int, sent: SentPackets) -> None:
@@ -165,9 +171,9 @@ class RadioMedium:
         packet. Senders may be in any order. ValueError, and nothing changed, for a receiver outside the arena or
         the sender itself, or for a time that has passed.
         """
-        self._check_sent(start_ns, sent)
+        self._check_time(start_ns)
         if len(sent):
-            self._accept(self._send_times.in_tick(start_ns, tick)[sent.sender], sent)
+            self._accept(self._send_times.of_senders(start_ns, tick, sent.sender), sent)
 
     def send_times(self, start_ns: int, tick: int) -> IntArray:
         """Return the send time of each robot in the tick that starts at `start_ns`, in ns, (rows,)."""
@@ -176,7 +182,7 @@ class RadioMedium:
     def send_at(self, sent_at_ns: IntArray, sent: SentPackets) -> None:
         """Queue packets within a tick, as `send`; `sent_at_ns` (k,) holds one time for all packets of a robot."""
         if len(sent):
-            self._check_sent(int(sent_at_ns[0] if len(sent) == 1 else sent_at_ns.min()), sent)
+            self._check_time(int(sent_at_ns[0] if len(sent) == 1 else sent_at_ns.min()))
             self._accept(sent_at_ns, sent)
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
@@ -192,17 +198,18 @@ class RadioMedium:
         since_ns, self._reported_ns = self._reported_ns, until_ns
         if until_ns < self._next_ns:
             return self._nothing, tx_status
-        names = self.radio.measures.columns
-        received, self._next_ns = results.received_between(since_ns, until_ns, self._open, names, self._robots)
-        if self._open.link_count >= MANY_LINKS:
+        received, self._next_ns = results.received_between(
+            since_ns, until_ns, self._packets, self._links, self._robots, self._measures
+        )
+        if len(self._links) >= MANY_LINKS:
             self._collect_final(until_ns)
         return received, tx_status
 
     def end(self) -> PacketCounts:
         """End the run: packets that are queued or under way end as IN_FLIGHT."""
         self._collect_final(self._reported_ns)
-        self._counters.count_in_flight(self._open.links, self._liveness.in_running_arenas(self._model.drain()))
-        self._keep_links(np.empty(0, np.int64))
+        self._counters.count_in_flight(self._links.rows, self._liveness.in_running_arenas(self._model.drain()))
+        self._keep_links(np.zeros(len(self._links), np.bool_))
         counts = reduce(add, [part.tally for part in self._parts], self._counters.close())
         self._parts = []
         return counts
@@ -214,12 +221,10 @@ class RadioMedium:
         """
         self._collect_final(self._reported_ns)
         leaving, queued = np.repeat(ended, self._robots), self._liveness.in_running_arenas(self._model.queued)
-        links = self._open.links
-        is_leaving = leaving[links.sender]
-        self._counters.count_in_flight(
-            links.select(np.flatnonzero(is_leaving)), queued.split(leaving[queued.sender])[0]
-        )
-        self._keep_links(np.flatnonzero(~is_leaving))
+        links = self._links.rows
+        is_leaving = leaving[links["sender"]]
+        self._counters.count_in_flight(links[is_leaving], queued[leaving[queued["sender"]]])
+        self._keep_links(~is_leaving)
         counts = self._counters.close(ended)
         if self._parts:
             final = Results.joined(self._parts)
@@ -239,61 +244,59 @@ class RadioMedium:
 
     def _accept(self, sent_at_ns: IntArray, sent: SentPackets) -> None:
         liveness = self._liveness
-        packets = self._model.accept(sent_at_ns, sent, liveness.others_alive, liveness.history.epoch)
-        self._counters.count_sent(packets)
-
-    def _pass_time(self, until_ns: int) -> None:
-        if until_ns < self._now_ns:
-            raise ValueError(f"until_ns: expected at least {self._now_ns}, got {until_ns}")
-        self._now_ns = until_ns
-        self._add_links(*self._model.pass_time(until_ns, self._liveness.history))
-
-    def _collect_final(self, until_ns: int) -> None:
-        """Collect the results of links that are final by `until_ns` before the next step does."""
-        if (self._open.links.final_at_ns <= until_ns).any():
-            self._parts.append(self._pop_final(until_ns, self.radio))
-
-    def _pop_final(self, until_ns: int, radio: Radio) -> Results:
-        """Remove the links that are final by `until_ns`; return their results, without transmit statuses.
-
-        Another thread may call it while poses are set.
-        """
-        received, finished, departed, open_rows = results.final_by(
-            until_ns, self._open, radio, self._robots, self._counters.final_counts
+        invalid = self._model.accept(
+            sent_at_ns, sent, liveness.others_alive, liveness.history.epoch, self._counters.counts
         )
-        if len(open_rows) < self._open.link_count:
-            self._keep_links(open_rows)
-        return Results(received, finished, departed, NO_TX_STATUSES, self._counters.close())
-
-    def _check_sent(self, at_ns: int, sent: SentPackets) -> None:
-        if at_ns < self._now_ns:
-            raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
-        if (invalid := first_without_receiver(sent, self._robots)) != NO_PACKET:
+        if invalid != NO_PACKET:
             raise ValueError(
                 f"to: expected the index of another robot, 0 to {self._robots - 1}, got {sent.to[invalid]}"
             )
 
+    def _pass_time(self, until_ns: int) -> None:
+        if until_ns < self._now_ns:
+            raise ValueError(f"until_ns: expected at least {self._now_ns}, got {until_ns}")
+        self._now_ns, first_new = until_ns, len(self._links)
+        self._model.pass_time(until_ns, self._liveness.history)
+        self._follow_links(first_new)
+
+    def _collect_final(self, until_ns: int) -> None:
+        """Collect the results of links that are final by `until_ns` before the next step does."""
+        if (self._links.rows["final_at_ns"] <= until_ns).any():
+            self._parts.append(self._pop_final(until_ns))
+
+    def _pop_final(self, until_ns: int) -> Results:
+        """Remove the links that are final by `until_ns`; return their results, without transmit statuses.
+
+        Another thread may call it while poses are set.
+        """
+        received, finished, departed = results.final_by(
+            *(until_ns, self._packets, self._links, self._robots, self._counters.counts, self._measures),
+            has_power=self.radio.is_phy,
+        )
+        return Results(received, finished, departed, NO_TX_STATUSES, self._counters.close())
+
+    def _check_time(self, at_ns: int) -> None:
+        if at_ns < self._now_ns:
+            raise ValueError(f"at_ns: expected at least {self._now_ns}, got {at_ns}")
+
     def _end_receptions(self, now_ns: int, disruption: Disruption) -> None:
         """End receptions of robots that are dead by `disruption`, and unfinished ones at radios that are off."""
-        links = self._open.links
-        is_open = (links.fate == RECEIVED) & (links.receiver != NO_ROBOT) & (links.final_at_ns > self._reported_ns)
-        links.fate[is_open & ~disruption.radio_on[links.receiver] & (links.final_at_ns > now_ns)] = Fate.BLACKOUT
-        links.fate[is_open & ~disruption.alive[links.receiver]] = Fate.RECEIVER_DEAD
+        links = self._links.rows
+        fate, receiver, final_at_ns = links["fate"], links["receiver"], links["final_at_ns"]
+        is_open = (fate == RECEIVED) & (receiver != NO_ROBOT) & (final_at_ns > self._reported_ns)
+        fate[is_open & ~disruption.radio_on[receiver] & (final_at_ns > now_ns)] = Fate.BLACKOUT
+        fate[is_open & ~disruption.alive[receiver]] = Fate.RECEIVER_DEAD
 
-    def _add_links(self, packets: Transmissions, links: Links) -> None:
-        """Add links until they are final, and their packets; none of arenas that have ended."""
-        if not len(packets):
+    def _follow_links(self, first_new: int) -> None:
+        """Follow the links from row `first_new` on, which are new; drop those of arenas that have ended."""
+        if len(self._links) == first_new:
             return
-        first_new, self._next_ns = self._open.link_count, 0
-        self._open.add(packets, links)
+        self._next_ns, links = 0, self._links.rows
         if self.radio.delays is not None and self.radio.delays.keep_order:
-            keep_link_order(self._open.links, first_new, self._rows)
-        if self._liveness.any_ended(packets.sender):
-            self._keep_links(np.flatnonzero(~self._liveness.has_ended(self._open.links.sender)))
+            keep_link_order(self._packets.rows, links, first_new, self._rows)
+        if self._liveness.any_ended(links["sender"][first_new:]):
+            self._keep_links(~self._liveness.has_ended(links["sender"]))
 
-    def _keep_links(self, index: IntArray) -> None:
-        """Keep only the links of `index` and their packets."""
-        if len(index):
-            self._open.keep(index)
-        else:
-            self._open = OpenLinks(Transmissions.none(), self._no_links)
+    def _keep_links(self, is_kept: BoolArray) -> None:
+        """Keep only the links of `is_kept` (links,) and their packets."""
+        self._links.keep(is_kept, self._packets)

@@ -8,15 +8,12 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray, Table
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.links import Links
 from swarmwire.comms.radio.liveness import LivenessHistory
-from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, SentPackets, TxStatuses
 
-Decided = tuple[Transmissions, Links]  # packets, and their links with fates
 # Tolerance: 1 - 0.9 is slightly below 0.1 in floating point.
 ROUNDING = 1e-9
 
@@ -24,14 +21,14 @@ ROUNDING = 1e-9
 class RadioModel(ABC):
     """The radios and the channel between them: packets go in, links with fates come out.
 
-    `pass_time` and `disrupt` return packets and their links with fates (`packet` is the row in those packets). A fate
+    `pass_time` and `disrupt` append links with fates, and a PHY also their packets, to the tables of the medium. A fate
     may become final later than the time that has passed.
     """
 
     @property
     @abstractmethod
-    def queued(self) -> Transmissions:
-        """Packets that wait or are on air."""
+    def queued(self) -> Table:
+        """Packets that wait or are on air and have no links yet, of type PACKET."""
 
     @abstractmethod
     def set_poses(self, pose: FloatArray) -> None:
@@ -45,18 +42,21 @@ class RadioModel(ABC):
         """Use the parameters of `radio` from `at_ns` on; packets that wait or are on air stay."""
 
     @abstractmethod
-    def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
-        """Queue packets that are sent at `sent_at_ns` (k,), and return them as admitted.
+    def accept(
+        self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int, counts: AnyArray
+    ) -> int:
+        """Queue packets that are sent at `sent_at_ns` (k,), and count them in `counts` (arenas,) of type COUNTS.
 
-        `others_alive` (rows,) is the number of intended receivers of a robot's broadcast.
+        `others_alive` (rows,) is the number of intended receivers of a robot's broadcast. Return NO_PACKET; or the
+        first packet without a receiver, and none is queued.
         """
 
     @abstractmethod
-    def pass_time(self, until_ns: int, liveness: LivenessHistory) -> Decided:
-        """Let time pass to just before `until_ns`, and return the packets and links that were decided."""
+    def pass_time(self, until_ns: int, liveness: LivenessHistory) -> None:
+        """Let time pass to just before `until_ns`."""
 
     @abstractmethod
-    def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> Decided:
+    def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> None:
         """Apply a disruption: dead robots lose their queues, radios that are off lose their receptions.
 
         Called while any robot is dead or any radio off, and once when that has ended: paused queues then go on air.
@@ -70,7 +70,7 @@ class RadioModel(ABC):
         return NO_TX_STATUSES
 
     @abstractmethod
-    def drain(self) -> Transmissions:
+    def drain(self) -> Table:
         """Remove all packets queued or on air, as the run ends; `intended` counts receivers without a fate."""
 
     @abstractmethod
@@ -88,5 +88,7 @@ def edges_above(pairs: IntArray, delivery: FloatArray | float, min_delivery: flo
 
     `delivery` is (k,), or one number for all pairs. The edges are in the order of the pairs: a < b in each, sorted.
     """
+    if isinstance(delivery, float):
+        return pairs if delivery >= min_delivery - ROUNDING else pairs[:0]
     joined = is_enough(delivery, min_delivery)
     return pairs if joined.all() else pairs[np.broadcast_to(joined, len(pairs))]

@@ -12,42 +12,39 @@ from operator import add
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, ByteArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
-from swarmwire.comms.radio import links as link
-from swarmwire.comms.radio import transmissions as packet
-from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, OpenLinks, renumbered
+from swarmwire.comms.base.sentinels import ABSENT, NO_ROBOT, UNDER_WAY
+from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, Links, keep_links
 from swarmwire.comms.radio.records import ON_AIR, PacketCounts, ReceptionRecords, TransmissionRecords
-from swarmwire.comms.radio.transmissions import payload_rows
+from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, TxStatuses
 
 NO_EDGES = np.empty((0, 2), np.int64)
 
 
 @njit()
-def sort_by_receiver(
-    index: IntArray, receiver: IntArray, received_at_ns: IntArray, sender: IntArray, rows: int
-) -> IntArray:
-    """Return the rows of `index` (k,), one or more, sorted by (receiver, received_at, sender); stable, (k,)."""
-    order = index.view(np.uint64)
-    if not _rises(order, received_at_ns):
-        order = _counting_sort(order, *_time_bins(order, received_at_ns))
+def order_of_delivery(receiver: AnyArray, at_ns: AnyArray, sender: AnyArray, rows: int):
+    """Return the rows sorted by (receiver, time, sender), (k,), all below `rows`; stable."""
+    order = np.arange(len(receiver)).astype(np.uint64)
+    if len(order) == 0:
+        return order
+    if not _rises(at_ns):
+        order = _counting_sort(order, *_time_bins(at_ns))
     # With rows sorted roughly by time, then by receiver, the insertion sort moves almost nothing.
     order = _counting_sort(order, receiver, rows)
-    _insertion_sort(order, receiver, received_at_ns, sender)
-    return order.view(np.int64)
+    _insertion_sort(order, receiver, at_ns, sender)
+    return order
 
 
 @njit()
-def _rises(order, at_ns):
-    """Return True if the times of rows in this order never fall, as those of a PHY's events."""
+def _rises(at_ns):
+    """Return True if the times never fall, as those of a PHY's events."""
     k = 1
-    while k < len(order) and at_ns[order[k - 1]] <= at_ns[order[k]]:
+    while k < len(at_ns) and at_ns[k - 1] <= at_ns[k]:
         k += 1
-    return k >= len(order)
+    return k >= len(at_ns)
 
 
 @njit()
@@ -68,18 +65,12 @@ def _counting_sort(order, key, keys):
 
 
 @njit()
-def _time_bins(order, at_ns):
+def _time_bins(at_ns):
     """Return the time bin of each row, for about as many bins of equal width as rows; and the number of bins."""
-    first_ns = last_ns = at_ns[order[0]]
-    for row in order:
-        first_ns, last_ns = min(first_ns, at_ns[row]), max(last_ns, at_ns[row])
-    shift = 0
-    while (last_ns - first_ns) >> shift > len(order):
+    first_ns, last_ns, shift = at_ns.min(), at_ns.max(), 0
+    while (last_ns - first_ns) >> shift > len(at_ns):
         shift += 1
-    time_bin = np.empty(len(at_ns), np.int64)
-    for row in order:
-        time_bin[row] = (at_ns[row] - first_ns) >> shift
-    return time_bin, ((last_ns - first_ns) >> shift) + 1
+    return (at_ns - first_ns) >> shift, ((last_ns - first_ns) >> shift) + 1
 
 
 @njit()
@@ -135,173 +126,190 @@ class Results:
 
 
 def received_between(
-    since_ns: int, until_ns: int, open_links: OpenLinks, measures: tuple[str, ...], robots: int
+    since_ns: int, until_ns: int, packets: Transmissions, links: Links, robots: int, measures: tuple[str, ...]
 ) -> tuple[ReceivedPackets, int]:
     """Return the packets received after `since_ns` and by `until_ns`, sorted as by `final_by`; the links stay.
 
     The second value is the time of the next reception, or NEVER_NS.
     """
-    tables = _tables(open_links)
-    columns, index, data, offset, next_ns = _received_between(since_ns, until_ns, *tables, robots)
-    measured = {name: open_links.measured[:, column].take(index) for column, name in enumerate(measures)}
-    receiver, sender, sequence, received_at_ns, payload = columns
-    payloads = Payloads(data, offset)
-    return ReceivedPackets(receiver, sender, sequence, received_at_ns, measured, payload, payloads), next_ns
-
-
-@njit()
-def _received_between(since_ns, until_ns, links, rows, packets, packet_rows, data, offset, robots):
-    packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
-    fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
-    index, count, next_ns = np.empty(rows, np.int64), 0, NEVER_NS
-    for row in range(rows):
-        if fate[row] == RECEIVED and final_at_ns[row] > since_ns:
-            if final_at_ns[row] <= until_ns:
-                index[count] = row
-                count += 1
-            else:
-                next_ns = min(next_ns, final_at_ns[row])
-    index = index[:count]
-    if count > 0:
-        index = sort_by_receiver(index, receiver, final_at_ns, sender, receiver[index].max() + 1)
-    used, payload = renumbered(packet_of[index], packet_rows)
-    first_row = packets[packet.SENDER, :packet_rows] // robots * robots
-    return _received(index, payload, links, first_row), index, *payload_rows(data, offset, used), next_ns
+    next_ns, received = _received_between(
+        *(since_ns, until_ns, packets.table, packets.data, packets.used, links.table, links.used, robots),
+        len(measures) > 0,
+    )
+    return _packets_of(received, measures), next_ns
 
 
 def final_by(
-    until_ns: int, open_links: OpenLinks, radio: Radio, robots: int, counts: tuple[IntArray, IntArray]
-) -> tuple[ReceivedPackets, ReceptionRecords, TransmissionRecords, IntArray]:
-    """Return the results of links that are final by `until_ns`, and the rows of the links that are still open.
+    until_ns: int,
+    packets: Transmissions,
+    links: Links,
+    robots: int,
+    counts: AnyArray,
+    measures: tuple[str, ...],
+    *,
+    has_power: bool,
+) -> tuple[ReceivedPackets, ReceptionRecords, TransmissionRecords]:
+    """Return the results of links that are final by `until_ns`, and remove these links and their packets.
 
     Received packets are sorted by (receiver, received_at, sender, sequence). Each arena has `robots` robots. Adds to
-    `counts`: fates (arenas, fates) and receivers in range (arenas,).
+    `counts`, (arenas,) of type COUNTS. `measures` are the names of the receivers' measurements.
     """
-    tables = _tables(open_links)
-    received, payloads, finished, finished_index, departed, open_rows = _final(until_ns, *tables, robots, *counts)
-    index, data, offset = payloads
-    sent_payloads = open_links.transmissions.payloads
-    *numbers, payload = received
-    measured = {name: open_links.measured[:, column].take(index) for column, name in enumerate(radio.measures.columns)}
-    rssi_dbm = open_links.rssi_dbm.take(finished_index) if radio.is_phy else None
-    *records, finished_payload = finished
+    received, finished, rssi_dbm, data, offset, departed = _final(
+        *(until_ns, packets.table, packets.data, packets.used, links.table, links.used, robots, counts),
+        len(measures) > 0,
+    )
+    payloads, rssi = Payloads(data, offset), rssi_dbm if has_power else None
     return (
-        ReceivedPackets(*numbers, measured=measured, payload=payload, payloads=Payloads(data, offset)),
-        ReceptionRecords(*records, rssi_dbm=rssi_dbm, payload=finished_payload, payloads=sent_payloads),
+        _packets_of(received, measures),
+        ReceptionRecords(*finished[:-1], rssi_dbm=rssi, payload=finished[-1], payloads=payloads),
         TransmissionRecords(*departed),
-        open_rows,
     )
 
 
-def _tables(open_links: OpenLinks) -> tuple[IntArray, int, IntArray, int, ByteArray, IntArray]:
-    """Return the links, their number, the packets, their number, and the packets' payloads, as kernels take them."""
-    payloads = open_links.data, open_links.offset
-    return open_links.table, open_links.link_count, open_links.packet_table, open_links.packet_count, *payloads
+def _packets_of(received: tuple[AnyArray, ...], measures: tuple[str, ...]) -> ReceivedPackets:
+    """Return the result of `_received`."""
+    columns, measured, data, offset = received
+    by_name = {name: measured[MEASUREMENTS.index(name)] for name in measures}
+    receiver, sender_index, sequence, received_at_ns, payload = columns
+    payloads = Payloads(data, offset)
+    return ReceivedPackets(receiver, sender_index, sequence, received_at_ns, by_name, payload, payloads)
+
+
+# Names in `ReceivedPackets.measured`, in the order of `_received`.
+MEASUREMENTS = ("range_m", "bearing_rad", "rssi_dbm")
+
+
+@njit()
+def _received_between(since_ns, until_ns, packets, data, used, links, link_used, robots, has_measures):
+    rows, next_ns, k = np.empty(link_used[0], np.uint64), NEVER_NS, 0
+    for row in range(link_used[0]):
+        link = links[row]
+        if link.fate == RECEIVED and link.final_at_ns > since_ns:
+            if link.final_at_ns <= until_ns:
+                rows[k] = row
+                k += 1
+            else:
+                next_ns = min(next_ns, link.final_at_ns)
+    return next_ns, _received(rows[:k], packets, data, used, links, robots, has_measures)
 
 
 @njit(nogil=True)
-def _final(until_ns, links, rows, packets, packet_rows, data, offset, robots, fates, in_range):
+def _final(until_ns, packets, data, used, links, link_used, robots, counts, has_measures):
     """Return the tables of `final_by`: each row of a table is a column of a result, in their order.
 
     A link may have several kinds of results: received; finished, without receivers out of range; and departed, one for
     each packet that left its sender's radio, in the row for its remaining receivers. AssertionError if a link has no
     fate.
     """
-    packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
-    fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
-    highest = np.uint64(0)  # read as an unsigned number, a sentinel is above all fates
-    for row in range(rows):
-        highest = max(highest, np.uint64(fate[row]))
-    if highest >= np.uint64(fates.shape[1]):
-        raise AssertionError("a link has no fate: no stage of the radio model decided it")
     # One division per packet, since one per link would double the time of this kernel.
-    arena = packets[packet.SENDER, :packet_rows] // robots
-    receiver_count, in_range_count = links[link.RECEIVER_COUNT], links[link.IN_RANGE]
-    # Each row of `kinds` begins with the links of one kind.
-    kinds = np.empty((4, rows), np.int64)
-    received, finished, departed, open_rows = kinds
-    h, f, d, o = np.uint64(0), np.uint64(0), np.uint64(0), np.uint64(0)
-    for row in range(np.uint64(rows)):
+    arena = np.empty(used[0], np.uint64)
+    for p in range(used[0]):
+        arena[p] = packets[p].sender // robots
+    kinds, is_open = np.empty((3, link_used[0]), np.uint64), np.empty(link_used[0], np.bool_)
+    received, finished, departed = kinds
+    h, f, d = np.uint64(0), np.uint64(0), np.uint64(0)
+    for row in range(np.uint64(link_used[0])):
+        link = links[row]
+        if np.uint64(link.fate) >= np.uint64(len(counts[0].fates)):  # a sentinel is above all fates
+            raise AssertionError("a link has no fate: the radio model did not decide it")
         # Branchless: write first, then advance if it counts.
-        received[h], finished[f], departed[d], open_rows[o] = row, row, row, row
-        final = final_at_ns[row] <= until_ns
-        h += np.uint64(final & (fate[row] == RECEIVED))
-        f += np.uint64(final & (fate[row] != OUT_OF_RANGE))
-        d += np.uint64(final & (receiver[row] == NO_ROBOT))
-        o += np.uint64(not final)
-        a = np.uint64(arena[np.uint64(packet_of[row])])
-        fates[a, np.uint64(fate[row])] += final * receiver_count[row]
-        in_range[a] += final * in_range_count[row]
-    index = received[:h]
-    if h > 0:
-        index = sort_by_receiver(index, receiver, final_at_ns, sender, len(fates) * robots)
-    used, payload = renumbered(packet_of[index], packet_rows)
-    return (
-        _received(index, payload, links, arena * robots),
-        (index, *payload_rows(data, offset, used)),
-        _finished(finished[:f], links, packets, offset, arena, robots),
-        finished[:f],
-        _departed(departed[:d], links, packets, arena, robots),
-        open_rows[:o],
+        received[h], finished[f], departed[d] = row, row, row
+        final, in_arena = link.final_at_ns <= until_ns, counts[arena[link.packet]]
+        h += np.uint64(final & (link.fate == RECEIVED))
+        f += np.uint64(final & (link.fate != OUT_OF_RANGE))
+        d += np.uint64(final & (link.receiver == NO_ROBOT))
+        is_open[row] = not final
+        in_arena.fates[link.fate] += final * link.receiver_count
+        in_arena.in_range += final * link.in_range
+    offset = np.empty(used[0] + 1, np.int64)
+    for p in range(used[0]):
+        offset[p] = packets[p].first_byte
+    offset[used[0]] = used[1]
+    results = (
+        _received(received[:h], packets, data, used, links, robots, has_measures),
+        *_finished(finished[:f], packets, links, arena, robots),
+        data[: used[1]].copy(),
+        offset,
+        _departed(departed[:d], packets, links, arena, robots),
     )
+    keep_links(links, link_used, is_open, packets, data, used)
+    return results
 
 
 @njit()
-def _received(index, payload, links, first_row):
-    """Return receiver, index of the sender, sequence, time of reception and payload, (5, k).
+def _received(rows, packets, data, used, links, robots, has_measures):
+    """Return the packets received on the links `rows`: columns (5, k), measurements (3, k) and payloads.
 
-    `first_row` is the first robot row of each packet's arena.
+    The columns are receiver, index of the sender, sequence, time of reception and row of the payload.
     """
-    packet_of, sender, receiver = links[link.PACKET], links[link.SENDER], links[link.RECEIVER]
-    sequence, final_at_ns = links[link.SEQUENCE], links[link.FINAL_AT]
-    columns = np.empty((5, len(index)), np.int64)
-    for k in range(len(index)):
-        row = np.uint64(index[k])
-        columns[0, k], columns[1, k], columns[2, k] = (
-            receiver[row],
-            sender[row] - first_row[packet_of[row]],
-            sequence[row],
-        )
-        columns[3, k], columns[4, k] = final_at_ns[row], payload[k]
-    return columns
+    k, first_row = len(rows), np.empty(used[0], np.int64)
+    for p in range(used[0]):
+        first_row[p] = packets[p].sender // robots * robots
+    # In columns, since the order of delivery reads them in random order.
+    receiver, at_ns, sender, sequence = (
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+        np.empty(k, np.int64),
+    )
+    packet_of, payload, count, size, last = np.empty(k, np.int64), np.full(used[0], ABSENT), 0, 0, 0
+    for n in range(np.uint64(k)):
+        link = links[rows[n]]
+        p = np.uint64(link.packet)
+        receiver[n], at_ns[n], packet_of[n] = link.receiver, link.final_at_ns, p
+        sender[n], sequence[n] = link.sender - first_row[p], packets[p].sequence
+        payload[p], last = 0, max(last, link.receiver)
+    for p in range(used[0]):
+        if payload[p] != ABSENT:
+            payload[p], count, size = count, count + 1, size + packets[p].size_bytes
+    received_data, offset, size = np.empty(size, np.uint8), np.zeros(count + 1, np.int64), 0
+    for p in range(used[0]):
+        if payload[p] != ABSENT:
+            for i in range(packets[p].size_bytes):  # byte by byte: slices count references
+                received_data[size + i] = data[packets[p].first_byte + i]
+            size += packets[p].size_bytes
+            offset[payload[p] + 1] = size
+    order = order_of_delivery(receiver, at_ns, sender, last + 1)
+    columns, measured = np.empty((5, k), np.int64), np.empty((3, k if has_measures else 0))
+    for n in range(np.uint64(k)):
+        i = order[n]
+        columns[0, n], columns[1, n], columns[2, n] = receiver[i], sender[i], sequence[i]
+        columns[3, n], columns[4, n] = at_ns[i], payload[packet_of[i]]
+    if has_measures:
+        for n in range(np.uint64(k)):
+            link = links[rows[order[n]]]
+            measured[0, n], measured[1, n], measured[2, n] = link.range_m, link.bearing_rad, link.measured_rssi_dbm
+    return columns, measured, received_data, offset
 
 
 @njit()
-def _finished(index, links, packets, offset, arena, robots):
-    """Return the integer columns of `ReceptionRecords`, then the rows of payloads, (13, k)."""
-    packet_of, receiver, receiver_count = links[link.PACKET], links[link.RECEIVER], links[link.RECEIVER_COUNT]
-    fate, final_at_ns = links[link.FATE], links[link.FINAL_AT]
-    sender, to = packets[packet.SENDER], packets[packet.TO]
-    sequence, tag = packets[packet.SEQUENCE], packets[packet.TAG]
-    sent_at_ns, on_air_at_ns = packets[packet.SENT_AT], packets[packet.ON_AIR_AT]
-    columns = np.empty((13, len(index)), np.int64)
-    for k in range(len(index)):
-        row = np.uint64(index[k])
-        p = np.uint64(packet_of[row])
-        first_row = arena[p] * robots
-        columns[0, k], columns[1, k] = arena[p], sender[p] - first_row
-        columns[2, k] = NO_ROBOT if receiver[row] == NO_ROBOT else receiver[row] - first_row
-        columns[3, k], columns[4, k], columns[5, k] = receiver_count[row], to[p], sequence[p]
-        columns[6, k], columns[7, k], columns[8, k] = sent_at_ns[p], on_air_at_ns[p], final_at_ns[row]
-        columns[9, k], columns[10, k] = fate[row], offset[p + np.uint64(1)] - offset[p]
-        columns[11, k], columns[12, k] = tag[p], packet_of[row]
-    return columns
+def _finished(rows, packets, links, arena, robots):
+    """Return the integer columns of `ReceptionRecords`, then the rows of payloads, (13, k); and the power, (k,)."""
+    columns, rssi_dbm = np.empty((13, len(rows)), np.int64), np.empty(len(rows))
+    for k in range(np.uint64(len(rows))):
+        link = links[rows[k]]
+        p = np.uint64(link.packet)
+        packet, first_row = packets[p], np.int64(arena[p]) * robots
+        columns[0, k], columns[1, k] = arena[p], packet.sender - first_row
+        columns[2, k] = NO_ROBOT if link.receiver == NO_ROBOT else link.receiver - first_row
+        columns[3, k], columns[4, k], columns[5, k] = link.receiver_count, packet.to, packet.sequence
+        columns[6, k], columns[7, k], columns[8, k] = packet.sent_at_ns, packet.on_air_at_ns, link.final_at_ns
+        columns[9, k], columns[10, k] = link.fate, packet.size_bytes
+        columns[11, k], columns[12, k], rssi_dbm[k] = packet.tag, p, link.rssi_dbm
+    return columns, rssi_dbm
 
 
 @njit()
-def _departed(index, links, packets, arena, robots):
+def _departed(rows, packets, links, arena, robots):
     """Return the columns of `TransmissionRecords`, (9, k)."""
-    packet_of, sender, sequence = links[link.PACKET], links[link.SENDER], links[link.SEQUENCE]
-    receiver_count, fate = links[link.RECEIVER_COUNT], links[link.FATE]
-    to, intended, fate_at_sender = packets[packet.TO], packets[packet.INTENDED], packets[packet.FATE]
-    on_air_at_ns, off_air_at_ns = packets[packet.ON_AIR_AT], packets[packet.OFF_AIR_AT]
-    columns = np.empty((9, len(index)), np.int64)
-    for k in range(len(index)):
-        row = np.uint64(index[k])
-        p = np.uint64(packet_of[row])
-        columns[0, k], columns[1, k], columns[2, k] = arena[p], sender[row] - arena[p] * robots, to[p]
-        columns[3, k], columns[4, k] = sequence[row], intended[p]
-        columns[5, k] = receiver_count[row] if fate[row] == OUT_OF_RANGE else 0
-        columns[6, k] = ON_AIR if fate_at_sender[p] == UNDER_WAY else fate_at_sender[p]
-        columns[7, k], columns[8, k] = on_air_at_ns[p], off_air_at_ns[p]
+    columns = np.empty((9, len(rows)), np.int64)
+    for k in range(np.uint64(len(rows))):
+        link = links[rows[k]]
+        p = np.uint64(link.packet)
+        packet = packets[p]
+        columns[0, k], columns[1, k], columns[2, k] = arena[p], packet.sender - np.int64(arena[p]) * robots, packet.to
+        columns[3, k], columns[4, k] = packet.sequence, packet.intended
+        columns[5, k] = link.receiver_count if link.fate == OUT_OF_RANGE else 0
+        columns[6, k] = ON_AIR if packet.fate == UNDER_WAY else packet.fate
+        columns[7, k], columns[8, k] = packet.on_air_at_ns, packet.off_air_at_ns
     return columns

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import IntArray, KeyArray
+from swarmwire.comms.base.arrays import IntArray, KeyArray, writeable
 from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
-from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.kernels import kernel, njit
 
 PHASE, JITTER = purpose("send phase"), purpose("send jitter")
 JITTER_SHARE = 5  # the jitter spans a fifth of the period, so that a robot's packets keep their order
@@ -42,6 +42,29 @@ class SendTimes:
             sent_at_ns += keyed_ns(self._keys, tick, JITTER, self._jitter_ns)
         return sent_at_ns
 
+    def of_senders(self, tick_start_ns: int, tick: int, sender: IntArray) -> IntArray:
+        """Return the send time of each robot row `sender` in this tick, in ns, (k,)."""
+        if not self._uniform:
+            return self._phase_ns[sender] + tick_start_ns
+        return _times_of(writeable(sender), tick_start_ns, tick, self._phase_ns, self._keys, self._jitter_ns)
+
+
+@njit()
+def _times_of(
+    sender: IntArray, start_ns: int, tick: int, phase_ns: IntArray, keys: KeyArray, jitter_ns: IntArray
+) -> IntArray:
+    times_ns, robots = np.empty(len(sender), np.int64), len(jitter_ns)
+    for k in range(len(sender)):
+        row = sender[k]
+        times_ns[k] = start_ns + phase_ns[row] + _keyed_ns(keys, row, tick, JITTER, jitter_ns, robots)
+    return times_ns
+
+
+@kernel()
+def _keyed_ns(keys: KeyArray, row: int, tick: int, draw_purpose: int, width_ns: IntArray, robots: int):
+    i = row % robots
+    return np.int64(uniform(keys[row // robots], i, tick, 0, draw_purpose) * width_ns[i])
+
 
 @njit()
 def keyed_ns(keys: KeyArray, tick: int, draw_purpose: int, width_ns: IntArray) -> IntArray:
@@ -52,7 +75,5 @@ def keyed_ns(keys: KeyArray, tick: int, draw_purpose: int, width_ns: IntArray) -
     robots = len(width_ns)
     draws = np.empty(len(keys) * robots, np.int64)
     for row in range(len(draws)):
-        draws[row] = np.int64(
-            uniform(keys[row // robots], row % robots, tick, 0, draw_purpose) * width_ns[row % robots]
-        )
+        draws[row] = _keyed_ns(keys, row, tick, draw_purpose, width_ns, robots)
     return draws

@@ -1,188 +1,134 @@
-"""The table of packets at or beyond their sender's radio, and the admission of sent packets to the queues.
+"""The table of packets at or beyond their sender's radio, and the admission of sent packets to it.
 
-The columns of a table are one array, and cross into compiled code as one argument: an argument costs a call from
-Python as much time as ten rows cost the kernel, and calls take most of the time of a tick of ten robots.
+A packet stays in its row from the sender's queue until all its fates are final. The table grows in place, and crosses
+into compiled code as three arrays: an argument costs a call from Python as much time as ten rows cost the kernel.
 """
 
 # pyright: basic, reportUnknownMemberType=false
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, ByteArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, ByteArray, IntArray, Table, record_type, writeable
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import BROADCAST, NO_PACKET, NO_TAG, NO_TX_STATUS, NOWHERE, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.robot.packets import TAG_BYTES, Payloads, SentPackets
+from swarmwire.comms.robot.packets import TAG_BYTES, SentPackets
 
-COLUMNS = 11
-SENDER, TO, SEQUENCE, INTENDED, EPOCH, TAG, SENT_AT, ON_AIR_AT, OFF_AIR_AT, FATE, TX_STATUS_ID = range(COLUMNS)
-
-
-class HasTable(Protocol):
-    """An object whose columns are the rows of one array."""
-
-    table: IntArray  # (columns, k)
-
-
-class Column:
-    """A named column of a `table`, (k,): a view, which may be written to."""
-
-    def __init__(self, number: int) -> None:
-        self._number = number
-
-    def __get__(self, table_owner: HasTable, owner: object = None) -> IntArray:
-        return table_owner.table[self._number]
+WAITING, DUE, DECIDED = range(3)  # steps of a packet: in its queue; leaving it; its links are in the table of links
+_I, _NS = np.int32, np.int64
+# The packets of a sender are in the order in which it sent them. One that ends at its sender's radio never goes on air:
+# its times on and off air are the time at which the radio drops it, that is `sent_at_ns` if its queue refuses it.
+PACKET = record_type(
+    [
+        ("sent_at_ns", _NS),  # arrival at the sender's radio
+        ("on_air_at_ns", _NS),  # start of the first bit
+        ("off_air_at_ns", _NS),  # end of the last bit
+        ("sequence", np.int64),  # number of packets that the sender sent before, refused ones included
+        ("tx_status_id", np.int64),  # ID of its transmit status, or NO_TX_STATUS
+        ("first_byte", np.int64),  # of its payload in `data`; payloads are in the order of the rows, without gaps
+        ("sender", _I),  # robot row
+        ("to", _I),  # index in the arena of the addressed robot, BROADCAST or NOWHERE
+        ("intended", _I),  # number of intended receivers
+        # Epoch of `LivenessHistory` when it was sent: a broadcast intends the robots that were alive in it.
+        ("epoch", _I),
+        ("tag", _I),  # tag of the message's class, or NO_TAG
+        ("size_bytes", _I),
+        ("fate", np.int8),  # UNDER_WAY if it waits or went on air; else its fate at all intended receivers
+        ("step", np.int8),
+    ]
+)
 
 
 class Transmissions:
-    """A row per packet; the packets of a sender are in the order in which it sent them.
+    """A table of packets that grows in place.
 
-    A packet that ends at its sender's radio never goes on air: its times on and off air are the time at which the radio
-    drops it, that is `sent_at_ns` if its queue refuses it at once.
+    Attributes:
+        table: records of type PACKET; rows from `len` on are unused.
+        data: their payloads.
+        used: number of packets, and of bytes in `data`, (2,).
     """
 
-    __slots__ = ("payloads", "table")
+    __slots__ = ("data", "table", "used")
 
-    sender = Column(SENDER)  # (k,) robot row
-    to = Column(TO)  # (k,) index in the arena of the addressed robot, BROADCAST or NOWHERE
-    sequence = Column(SEQUENCE)  # (k,) number of packets that the sender sent before, refused ones included
-    intended = Column(INTENDED)  # (k,) number of intended receivers
-    # (k,) epoch of `LivenessHistory` when it was sent: a broadcast intends the robots that were alive in it
-    epoch = Column(EPOCH)
-    tag = Column(TAG)  # (k,) tag of the message's class, or NO_TAG
-    sent_at_ns = Column(SENT_AT)  # (k,) arrival at the sender's radio
-    on_air_at_ns = Column(ON_AIR_AT)  # (k,) start of the first bit
-    off_air_at_ns = Column(OFF_AIR_AT)  # (k,) end of the last bit
-    fate = Column(FATE)  # (k,) UNDER_WAY if it waits or went on air; else its fate at all intended receivers
-    tx_status_id = Column(TX_STATUS_ID)  # (k,) ID of its transmit status, or NO_TX_STATUS
-
-    def __init__(self, table: IntArray, payloads: Payloads) -> None:
-        """Use `table` (COLUMNS, k), which holds the columns in their order, and `payloads` of k rows."""
-        self.table, self.payloads = table, payloads
-
-    @classmethod
-    def none(cls) -> "Transmissions":
-        """No packets."""
-        return _NONE
+    def __init__(self) -> None:
+        self.table: Table = np.zeros(16, PACKET)
+        self.data: ByteArray = np.empty(256, np.uint8)
+        self.used: IntArray = np.zeros(2, np.int64)
 
     def __len__(self) -> int:
-        return self.table.shape[1]
+        return int(self.used[0])
 
-    def select(self, index: IntArray) -> "Transmissions":
-        """Return the packets of `index`, in its order."""
-        if len(index) == len(self) and (index[1:] > index[:-1]).all():  # all packets, in order
-            return self
-        payloads = Payloads(*payload_rows(self.payloads.data, self.payloads.offset, index))
-        return Transmissions(self.table.take(index, axis=1), payloads)
+    @property
+    def rows(self) -> Table:
+        """The packets, as a view."""
+        return self.table[: self.used[0]]
 
-    def split(self, selected: BoolArray) -> "tuple[Transmissions, Transmissions]":
-        """Return the packets `selected` (k,), and the others."""
-        count = np.count_nonzero(selected)
-        if count == len(self):
-            return self, Transmissions.none()
-        if not count:
-            return Transmissions.none(), self
-        first, second = _split(self.table, self.payloads.data, self.payloads.offset, selected)
-        return Transmissions(first[0], Payloads(first[1], first[2])), Transmissions(
-            second[0], Payloads(second[1], second[2])
-        )
+    def reserve(self, packets: int, size_bytes: int) -> None:
+        """Make room for more packets and bytes of payload."""
+        self.table = grown(self.table, int(self.used[0]), packets)
+        self.data = grown(self.data, int(self.used[1]), size_bytes)
 
-    def followed_by(self, later: "Transmissions") -> "Transmissions":
-        """Return these packets and then the later ones."""
-        if not (len(self) and len(later)):
-            return self if len(self) else later
-        first, second = self.payloads, later.payloads
-        table, data, offset = _append(self.table, first.data, first.offset, later.table, second.data, second.offset)
-        return Transmissions(table, Payloads(data, offset))
-
-    def with_columns(self, **columns: IntArray) -> "Transmissions":
-        """Return the packets with new values in `columns`."""
-        changed = Transmissions(self.table.copy(), self.payloads)
-        for name, values in columns.items():
-            getattr(changed, name)[:] = values
-        return changed
+    def keep(self, is_kept: BoolArray) -> None:
+        """Keep only the packets of `is_kept` (packets,)."""
+        keep_packets(self.table, self.data, self.used, is_kept, np.empty(len(is_kept), np.int64))
 
 
-# Payloads that may be written to, as those of kernels.
-_NONE = Transmissions(np.empty((COLUMNS, 0), np.int64), Payloads(np.empty(0, np.uint8), np.zeros(1, np.int64)))
+def grown(table: AnyArray, used: int, more: int) -> AnyArray:
+    """Return the table if it has room for `more` rows after those in use, or a copy of twice the length."""
+    if used + more <= len(table):
+        return table
+    larger = np.empty(2 * (used + more), table.dtype)
+    larger.view(np.uint8)[: used * table.itemsize] = table.view(np.uint8)[: used * table.itemsize]  # much faster
+    return larger
 
 
-@njit()
-def payload_rows(data: ByteArray, offset: IntArray, index: IntArray) -> tuple[ByteArray, IntArray]:
-    """Return `data` and `offset` of a table of the payloads of `index`, in its order."""
-    starts = np.zeros(len(index) + 1, np.int64)
-    for k in range(len(index)):
-        starts[k + 1] = starts[k] + offset[index[k] + 1] - offset[index[k]]
-    selected = np.empty(starts[-1], np.uint8)
-    for k in range(len(index)):
-        # Byte by byte, since slices count references, which takes longer than to copy the bytes.
-        to, row = np.uint64(starts[k]), np.uint64(offset[index[k]])
-        for i in range(np.uint64(starts[k + 1]) - to):
-            selected[to + i] = data[row + i]
-    return selected, starts
+@kernel()
+def move_packet(packets, data, row, source, first_byte):
+    """Move packet `source` to an earlier or the same row, and its payload to `first_byte`."""
+    packet = packets[row]
+    from_byte, size_bytes = packets[source].first_byte, packets[source].size_bytes
+    if row != source:
+        packets[row] = packets[source]
+    packet.first_byte = first_byte
+    if from_byte != first_byte:
+        for i in range(size_bytes):
+            data[first_byte + i] = data[from_byte + i]
+    return first_byte + size_bytes
 
 
-@njit()
-def _split(table, data, offset, selected):
-    """Return columns and payloads of the packets `selected` (k,), and of the others."""
-    return _rows(table, data, offset, np.flatnonzero(selected)), _rows(table, data, offset, np.flatnonzero(~selected))
-
-
-@njit()
-def _rows(table, data, offset, index):
-    """Return columns and payloads of the packets of `index`."""
-    rows = np.empty((len(table), len(index)), np.int64)
-    for column in range(len(table)):
-        for k in range(len(index)):
-            rows[column, k] = table[column, index[k]]
-    return rows, *payload_rows(data, offset, index)
-
-
-@njit()
-def _append(table, data, offset, later_table, later_data, later_offset):
-    """Return columns and payloads of packets, and then of later ones."""
-    first, later, size = table.shape[1], later_table.shape[1], len(data)
-    joined = np.empty((len(table), first + later), np.int64)
-    joined_data, joined_offset = np.empty(size + len(later_data), np.uint8), np.empty(first + later + 1, np.int64)
-    # Number by number, since slices take a second longer to compile.
-    for column in range(len(table)):
-        for k in range(first):
-            joined[column, k] = table[column, k]
-        for k in range(later):
-            joined[column, first + k] = later_table[column, k]
-    for i in range(size):
-        joined_data[i] = data[i]
-    for i in range(len(later_data)):
-        joined_data[size + i] = later_data[i]
-    for k in range(first):
-        joined_offset[k] = offset[k]
-    for k in range(later + 1):
-        joined_offset[first + k] = later_offset[k] + offset[first]
-    return joined, joined_data, joined_offset
+@kernel(from_python=True)
+def keep_packets(packets, data, used, is_kept, new_row):
+    """Keep the packets of `is_kept` (packets,), and write the new row of each to `new_row` (packets,)."""
+    row = size = 0
+    for p in range(used[0]):
+        new_row[p] = row
+        if is_kept[p]:
+            size = move_packet(packets, data, row, p, size)
+            row += 1
+    used[0], used[1] = row, size
 
 
 def first_without_receiver(sent: SentPackets, robots: int) -> int:
     """Return the first packet whose `to` is not another robot of its arena, BROADCAST or NOWHERE; or NO_PACKET."""
-    return _first_without_receiver(_writeable(sent.sender), _writeable(sent.to), robots)
-
-
-def _writeable(array: IntArray) -> IntArray:
-    """Return the array, or a copy of a read-only one from the wire.
-
-    A kernel would be compiled once more for read-only arrays.
-    """
-    return array if array.flags.writeable else array.copy()
+    return _first_without_receiver(writeable(sent.sender), writeable(sent.to), robots)
 
 
 @njit()
 def _first_without_receiver(sender, to, robots):
-    for p in range(len(to)):
-        if to[p] < NOWHERE or to[p] >= robots or to[p] == sender[p] % robots:
-            return p
+    for k in range(len(to)):
+        if lacks_receiver(sender[k], to[k], robots):
+            return k
     return NO_PACKET
+
+
+@kernel()
+def lacks_receiver(sender, to, robots):
+    """Return True if `to` is not another robot of the sender's arena, BROADCAST or NOWHERE."""
+    return to < NOWHERE or to >= robots or to == sender % robots
 
 
 def frame_sizes(radio: Radio) -> tuple[int, IntArray]:
@@ -192,42 +138,96 @@ def frame_sizes(radio: Radio) -> tuple[int, IntArray]:
 
 
 @kernel()
-def size_row(packets, offset, p, headers_bytes):
-    """Return the row of packet `p` of a table in `frame_sizes`; beyond its end if the packet is too large."""
-    return offset[p + 1] - offset[p] + headers_bytes * (packets[TAG, p] != FRAME_TAG)
+def size_row(packet, headers_bytes):
+    """Return the row of a packet in `frame_sizes`; beyond its end if the packet is too large."""
+    return packet.size_bytes + headers_bytes * (packet.tag != FRAME_TAG)
+
+
+class SentColumns(NamedTuple):
+    """Columns of sent packets as input of kernels."""
+
+    sender: IntArray
+    to: IntArray
+    sent_at_ns: IntArray
+    tx_status_id: IntArray  # empty: all NO_TX_STATUS
+    data: ByteArray
+    offset: IntArray
+
+
+NO_IDS = np.empty(0, np.int64)
+UNSORTED = -6  # `admit` returns it in place of NO_PACKET or a row
 
 
 class Admission:
-    """Turns sent packets into transmissions, and gives each the sequence number of its radio."""
+    """Appends sent packets to a table of transmissions, and gives each the sequence number of its radio."""
 
-    def __init__(self, rows: int) -> None:
-        self._sent_before = np.zeros(rows, np.int64)
+    def __init__(self, rows: int, packets: Transmissions) -> None:
+        self._packets, self._sent_before = packets, np.zeros(rows, np.int64)
 
-    def admit(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
-        """Return the packets sorted by sender, with all times at `sent_at_ns` (k,); none is intended for NOWHERE.
+    def accept(
+        self,
+        kernel: Callable[..., int],
+        sent_at_ns: IntArray,
+        sent: SentPackets,
+        others_alive: IntArray,
+        epoch: int,
+        counts: AnyArray,
+        params: tuple[Any, ...],
+    ) -> int:
+        """Append sent packets, sorted by sender, by a `kernel` that calls `admit` and has more `params`.
 
-        `others_alive` (rows,) is the number of intended receivers of a robot's broadcasts in this epoch.
+        Return the first packet without a receiver, and nothing is appended; or NO_PACKET.
         """
+        packets, data = self._packets, sent.payloads.data
+        packets.reserve(len(sent), len(data))
+        columns = SentColumns(
+            writeable(sent.sender),
+            writeable(sent.to),
+            sent_at_ns,
+            NO_IDS if sent.tx_status_id is None else writeable(sent.tx_status_id),
+            writeable(data),
+            writeable(sent.payloads.offset),
+        )
+        table, used, sent_before = packets.table, packets.used, self._sent_before
+        result = kernel(table, packets.data, used, columns, others_alive, epoch, sent_before, counts, *params)
+        if result != UNSORTED:
+            return result
         # Results must not depend on how the robots are divided among runners.
-        if len(sent) > 1 and (sent.sender[1:] < sent.sender[:-1]).any():
-            order = np.argsort(sent.sender, kind="stable")
-            sent, sent_at_ns = sent.select(order), sent_at_ns[order]
-        payloads = Payloads(sent.payloads.data.copy(), sent.payloads.offset.copy())  # the table shares them
-        table = np.empty((COLUMNS, len(sent)), np.int64)
-        table[SENDER], table[TO], table[SENT_AT] = sent.sender, sent.to, sent_at_ns
-        table[TX_STATUS_ID] = NO_TX_STATUS if sent.tx_status_id is None else sent.tx_status_id
-        _admit(table, payloads.data, payloads.offset, others_alive, epoch, self._sent_before)
-        return Transmissions(table, payloads)
+        order = np.argsort(sent.sender, kind="stable")
+        return self.accept(kernel, sent_at_ns[order], sent.select(order), others_alive, epoch, counts, params)
 
 
-@kernel(from_python=True)
-def _admit(table, data, offset, others_alive, epoch, sent_before):
-    """Fill in the other columns of the packets; increments `sent_before` (rows,)."""
-    for p in range(table.shape[1]):
-        s, to, sent_at_ns, first = table[SENDER, p], table[TO, p], table[SENT_AT, p], offset[p]
-        has_tag = offset[p + 1] - first >= TAG_BYTES
-        table[TAG, p] = np.int64(data[first]) | np.int64(data[first + 1]) << 8 if has_tag else NO_TAG
-        table[INTENDED, p] = others_alive[s] if to == BROADCAST else np.int64(to != NOWHERE)
-        table[SEQUENCE, p], table[EPOCH, p], table[FATE, p] = sent_before[s], epoch, UNDER_WAY
-        table[ON_AIR_AT, p] = table[OFF_AIR_AT, p] = sent_at_ns
+@kernel()
+def admit(packets, data, used, sent, others_alive, epoch, sent_before, counts):
+    """Append sent packets to the table, with all times at `sent_at_ns`; none is intended for NOWHERE.
+
+    Return NO_PACKET; or the first packet without a receiver, or UNSORTED unless they are sorted by sender, and nothing
+    is appended. `others_alive` (rows,) is the number of intended receivers of a robot's broadcasts in this epoch.
+    Increments `sent_before` (rows,), and counts the packets in `counts` (arenas,) of type COUNTS.
+    """
+    robots, is_sorted = len(sent_before) // len(counts), True
+    for k in range(len(sent.sender)):
+        if lacks_receiver(sent.sender[k], sent.to[k], robots):
+            return k
+        is_sorted = is_sorted and (k == 0 or sent.sender[k - 1] <= sent.sender[k])
+    if not is_sorted:
+        return UNSORTED
+    for k in range(len(sent.sender)):
+        packet, s, to, first = packets[used[0]], sent.sender[k], sent.to[k], sent.offset[k]
+        size = sent.offset[k + 1] - first
+        packet.sender, packet.to, packet.sequence, packet.epoch = s, to, sent_before[s], epoch
+        packet.intended = others_alive[s] if to == BROADCAST else np.int64(to != NOWHERE)
+        packet.tag = np.int64(sent.data[first]) | np.int64(sent.data[first + 1]) << 8 if size >= TAG_BYTES else NO_TAG
+        packet.tx_status_id = sent.tx_status_id[k] if len(sent.tx_status_id) > 0 else NO_TX_STATUS
+        packet.sent_at_ns = packet.on_air_at_ns = packet.off_air_at_ns = sent.sent_at_ns[k]
+        packet.fate, packet.step = UNDER_WAY, WAITING
+        packet.first_byte, packet.size_bytes = used[1], size
+        for i in range(size):
+            data[used[1] + i] = sent.data[first + i]
+        used[0] += 1
+        used[1] += size
         sent_before[s] += 1
+        arena = counts[s // robots]
+        arena.sent += 1
+        arena.intended += packet.intended
+    return NO_PACKET

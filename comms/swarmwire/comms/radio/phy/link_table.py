@@ -20,7 +20,7 @@ from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkRanges, Table
 from swarmwire.comms.radio.propagation.decibels import from_db
-from swarmwire.comms.radio.stages.blocking import LineOfSight
+from swarmwire.comms.radio.stages.blocking import LineOfSight, end_disrupted
 from swarmwire.comms.robot.packets import Fate
 
 OMITTED, WEAK, STRONG = range(3)
@@ -210,8 +210,8 @@ class LinkTable:
         fate = np.full((2, len(pairs.a)), UNDER_WAY, np.int8)
         fate[:, pairs.blocked] = int(Fate.BLOCKED)
         if disruption.is_active:
-            disruption.end_links(fate[0], pairs.a, pairs.b)
-            disruption.end_links(fate[1], pairs.b, pairs.a)
+            end_disrupted(disruption.cuts, fate[0], pairs.a, pairs.b)
+            end_disrupted(disruption.cuts, fate[1], pairs.b, pairs.a)
         return links_by_sender(
             pairs, self.propagation.send_dbm, self.propagation.receive_dbi, fate, self._thresholds, on_air
         )

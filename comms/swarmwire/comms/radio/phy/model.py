@@ -5,104 +5,110 @@ run into packets and links with fates, and passes the links through the stages t
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from swarmwire.comms.base import math as portable
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray, Table
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.links import Links
+from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.liveness import LivenessHistory
-from swarmwire.comms.radio.model import Decided, RadioModel
+from swarmwire.comms.radio.model import RadioModel
 from swarmwire.comms.radio.phy import jamming, mac, tx_queue
 from swarmwire.comms.radio.phy.event_queue import event_queue
 from swarmwire.comms.radio.phy.graph import RadioGraph
 from swarmwire.comms.radio.phy.jamming import JammerTable
 from swarmwire.comms.radio.phy.link_table import LinkTable
-from swarmwire.comms.radio.phy.packets import (
-    PacketTable,
-    final_statuses,
-    frames_of,
-    links_of_rows,
-)
+from swarmwire.comms.radio.phy.packets import PacketTable, append_results, final_statuses, frames_of
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks
 from swarmwire.comms.radio.phy.params import phy_params_of, thresholds_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams, propagation_params_of
 from swarmwire.comms.radio.phy.results import ResultBuffer, joined_rows, result_buffer
-from swarmwire.comms.radio.phy.state import IDLE, SILENT, PhyState, RadioSwitches, Table, idle_receptions, idle_robots
-from swarmwire.comms.radio.stages.chain import chain_after_reception
+from swarmwire.comms.radio.phy.state import IDLE, SILENT, PhyState, RadioSwitches, idle_receptions, idle_robots
+from swarmwire.comms.radio.stages.chain import after_reception, stages_after
+from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
 from swarmwire.comms.radio.stages.losses import LossChain
-from swarmwire.comms.radio.transmissions import Admission, Transmissions
-from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, Payloads, SentPackets, TxStatuses
+from swarmwire.comms.radio.transmissions import Transmissions
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, SentPackets, TxStatuses
 
 EVERY_ROW = np.empty(0, np.bool_)
 Poses = dict[int, FloatArray]  # poses (rows, 3) by their number
 
 
 class Reporter:
-    """Converts result rows to links, and passes them through the stages that follow reception."""
+    """Appends result rows to the tables of the medium as packets and links, after the stages that follow reception."""
 
-    def __init__(self, context: ChannelContext, links: LinkTable) -> None:
-        self._robots, self._links, self._columns = context.robots, links, len(context.radio.measures.columns)
-        self._no_links = Links.none(self._columns)
+    def __init__(self, context: ChannelContext, link_table: LinkTable, packets: Transmissions, links: Links) -> None:
+        self._robots, self._keys, self._link_table = context.robots, context.keys, link_table
+        self._packets, self._links = packets, links
         self.tune(context)
 
     def tune(self, context: ChannelContext) -> None:
         """Use the radio parameters of `context` from now on."""
-        self._stages = chain_after_reception(context)
+        self._stages = stages_after(context)
 
-    def decided(
-        self, parts: list[ResultBuffer], queued: Transmissions, packet: Table, poses: Poses, liveness: LivenessHistory
-    ) -> Decided:
-        """Return packets and links of the result rows in `parts`; `queued` and `packet` have the same rows."""
+    def report(self, parts: list[ResultBuffer], queued: PacketTable, poses: Poses, liveness: LivenessHistory) -> None:
+        """Append packets and links of the result rows in `parts`, which are rows of `queued`."""
         if not parts:
-            return Transmissions.none(), self._no_links
-        buffer, payloads = joined_rows(parts), queued.payloads
-        is_intended = _is_intended(queued, buffer, liveness) if liveness.any_dead else EVERY_ROW
-        table, data, offset, link_table, power_mw, row_of = links_of_rows(
-            queued.table, payloads.data, payloads.offset, packet, buffer, is_intended
+            return
+        buffer, packets, links = joined_rows(parts), self._packets, self._links
+        is_intended = _is_intended(queued.queued, buffer, liveness) if liveness.any_dead else EVERY_ROW
+        packets.reserve(len(queued), int(queued.queued.used[1]))
+        links.reserve(int(buffer.count[0]) + len(queued))
+        first_packet, first_link = len(packets), len(links)
+        row_of = append_results(
+            *(queued.queued.table, queued.queued.data, queued.table, buffer, is_intended),
+            *(packets.table, packets.data, packets.used, links.table, links.used),
         )
-        packets = Transmissions(table, Payloads(data, offset))
         with np.errstate(divide="ignore"):
-            rssi_dbm = 10.0 * portable.log10(power_mw)
-        links = Links(link_table, rssi_dbm, np.zeros((len(rssi_dbm), self._columns)))
-        if np.count_nonzero(packets.fate != UNDER_WAY):
-            links.in_range[len(row_of) :] = self._count_in_range(packets, liveness)
-        if self._stages:
-            self._pass(links.first(len(row_of)), buffer.pose_id[row_of], poses)
-        return packets, links
-
-    def _pass(self, links: Links, pose_id: IntArray, poses: Poses) -> None:
-        """Pass links through the stages that follow reception; `pose_id` (k,) are the numbers of their poses."""
+            links.rows["rssi_dbm"][first_link : first_link + len(row_of)] = 10.0 * portable.log10(
+                buffer.power_mw[row_of]
+            )
+        new = packets.rows[first_packet:]
+        if np.count_nonzero(new["fate"] != UNDER_WAY):
+            links.rows["in_range"][first_link + len(row_of) :] = self._count_in_range(new, liveness)
+        pose_id = buffer.pose_id[row_of]
         for number in np.unique(pose_id).tolist():
-            index = np.flatnonzero(pose_id == number)
-            part = links.select(index)
-            for stage in self._stages:
-                stage.decide(part, poses[number])
-            links.final_at_ns[index], links.measured[index] = part.final_at_ns, part.measured
+            index = first_link + np.flatnonzero(pose_id == number)
+            pass_received(index, links.table, packets.table, poses[number], self._keys, self._stages)
 
-    def _count_in_range(self, packets: Transmissions, liveness: LivenessHistory) -> IntArray:
+    def _count_in_range(self, packets: Table, liveness: LivenessHistory) -> IntArray:
         """Return the receivers in range of packets that never went on air, (packets,); 0 for the others."""
-        in_range = np.zeros(len(packets), np.int64)
-        candidates = np.flatnonzero((packets.fate != UNDER_WAY) & (packets.fate != Fate.TOO_LARGE))
+        in_range, to = np.zeros(len(packets), np.int64), packets["to"]
+        candidates = np.flatnonzero((packets["fate"] != UNDER_WAY) & (packets["fate"] != Fate.TOO_LARGE))
         if not len(candidates):
             return in_range
-        index, receiver = self._links.reached(packets.sender[candidates])
+        index, receiver = self._link_table.reached(packets["sender"][candidates])
         packet = candidates[index]
-        is_broadcast = packets.to[packet] == BROADCAST
-        is_addressee = packets.to[packet] == receiver % self._robots
-        is_intended = is_addressee | (is_broadcast & liveness.intended(packets.epoch[packet], receiver))
+        is_broadcast, is_addressee = to[packet] == BROADCAST, to[packet] == receiver % self._robots
+        is_intended = is_addressee | (is_broadcast & liveness.intended(packets["epoch"][packet], receiver))
         np.add.at(in_range, packet[is_intended], 1)
         return in_range
+
+
+@njit(nogil=True)
+def pass_received(index: AnyArray, links: Any, packets: Any, pose: AnyArray, keys: AnyArray, stages: Any):
+    """Pass the links of `index` (k,) that were received through the stages that follow reception; in place."""
+    robots = len(pose) // len(keys)
+    for i in index:
+        link = links[i]
+        if link.fate == RECEIVED:
+            s, r, sequence = np.int64(link.sender), np.int64(link.receiver), packets[link.packet].sequence
+            arena, at_ns = s // robots, link.final_at_ns
+            first_row = arena * robots
+            frame = ReceivedFrame(keys[arena], s, r, s - first_row, r - first_row, sequence, 0, False, at_ns, at_ns)
+            after_reception(stages, pose, frame, link)
 
 
 def _is_intended(queued: Transmissions, rows: ResultBuffer, liveness: LivenessHistory) -> BoolArray:
     """Return True for rows whose receiver was alive when the packet was sent, or is its addressee, (k,)."""
     packet, receiver = (column[: int(rows.count[0])] for column in (rows.packet, rows.receiver))
-    return liveness.intended(queued.epoch[packet], receiver) | (queued.to[packet] != BROADCAST)
+    return liveness.intended(queued.rows["epoch"][packet], receiver) | (queued.rows["to"][packet] != BROADCAST)
 
 
 MIN_CAPACITY = 4096
@@ -111,7 +117,7 @@ MIN_CAPACITY = 4096
 class SinrPhy(RadioModel):
     """Packets queue, go on air by the access method, and are received depending on signal, noise and interference."""
 
-    def __init__(self, context: ChannelContext) -> None:
+    def __init__(self, context: ChannelContext, packets: Transmissions, links: Links) -> None:
         self._context, self._radio = context, context.radio
         rows = len(context.keys) * context.robots
         self._params = phy_params_of(context.radio, context.robots)
@@ -120,11 +126,10 @@ class SinrPhy(RadioModel):
         self._links = LinkTable(context, self._propagation_params(), thresholds, self._measured)
         self._jam, self._was_jammed = JammerTable(context), False
         self._graph = RadioGraph(context, self._params, self._links, self._jam, self._losses)
-        self._reports = Reporter(context, self._links)
-        self._admission = Admission(rows)
+        self._reports = Reporter(context, self._links, packets, links)
         self._events = event_queue(rows)
         self._robot, self._reception = idle_robots(rows), idle_receptions(rows)
-        self._packets, self._frames = PacketTable(), frames_of(context.radio)
+        self._packets, self._frames = PacketTable(rows), frames_of(context.radio)
         # Queues are set up again if packets are new; no event is due before `_next_ns`.
         self._order, self._start = np.empty(0, np.int64), np.zeros(rows + 1, np.int64)
         self._is_new, self._next_ns, self._buffer = True, 0, result_buffer(MIN_CAPACITY)
@@ -134,9 +139,9 @@ class SinrPhy(RadioModel):
         self._tx_status: list[TxStatuses] = []
 
     @property
-    def queued(self) -> Transmissions:
+    def queued(self) -> Table:
         """Packets that wait or are on air."""
-        return self._packets.queued
+        return self._packets.queued.rows
 
     def set_poses(self, pose: FloatArray) -> None:
         """Move the robots to `pose` (rows, 3)."""
@@ -174,20 +179,20 @@ class SinrPhy(RadioModel):
         self._links.tune(self._propagation_params(), thresholds_of(radio, self._params))
         self._refresh()
 
-    def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
+    def accept(
+        self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int, counts: AnyArray
+    ) -> int:
         """Queue packets; events decide when they go on air."""
-        admitted = self._admission.admit(sent_at_ns, sent, others_alive, epoch)
-        self._packets.add(admitted, self._frames, self._context.robots)
         self._is_new, self._next_ns = True, 0
-        return admitted
+        return self._packets.accept(sent_at_ns, sent, others_alive, epoch, counts, self._frames)
 
-    def pass_time(self, until_ns: int, liveness: LivenessHistory) -> Decided:
+    def pass_time(self, until_ns: int, liveness: LivenessHistory) -> None:
         """Handle the events due before `until_ns`."""
         parts: list[ResultBuffer] = []
         if self._next_ns < until_ns or self._jam.anything:
             parts = self._run(until_ns)
         self._now_ns = until_ns
-        return self._decided(parts, liveness)
+        self._report(parts, liveness)
 
     def _run(self, until_ns: int) -> list[ResultBuffer]:
         """Handle the events due before `until_ns`; return the result rows, in parts; none if no packet changed."""
@@ -212,7 +217,7 @@ class SinrPhy(RadioModel):
         self._last_rows = sum(int(part.count[0]) for part in parts)
         return parts if self._last_rows or self._packets.any_done else []
 
-    def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> Decided:
+    def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> None:
         """End the queues of dead robots, suspend those of radios that are off, and end the receptions of both."""
         state = self._state(tx_queue.switches_of(disruption), at_ns)
         mac.order_queues(state, self._events, self._start)
@@ -220,7 +225,7 @@ class SinrPhy(RadioModel):
         mac.stop_dead(state, self._events, buffer, disruption.alive, at_ns)
         mac.end_receptions(self._params, state, self._events, disruption.alive, disruption.radio_on, at_ns)
         tx_queue.switch(self._params, state, self._events, buffer, at_ns)
-        return self._decided([buffer], liveness)
+        self._report([buffer], liveness)
 
     def tx_status(self, alive: BoolArray) -> TxStatuses:
         """Return the transmit statuses since the last call, of senders that are `alive` (rows,)."""
@@ -229,7 +234,7 @@ class SinrPhy(RadioModel):
         statuses, self._tx_status = TxStatuses.joined(self._tx_status), []
         return statuses.select(np.flatnonzero(alive[statuses.row])) if len(statuses) else statuses
 
-    def drain(self) -> Transmissions:
+    def drain(self) -> Table:
         """Remove and return all packets that are queued or on air."""
         self._events.size[0] = 0
         self._events.heap_index[:] = ABSENT
@@ -266,12 +271,12 @@ class SinrPhy(RadioModel):
             self._jam.between(self._now_ns, until_ns),
         )
 
-    def _decided(self, parts: list[ResultBuffer], liveness: LivenessHistory) -> Decided:
-        """Return packets and links of the result rows, and remove packets that are done from the queue."""
+    def _report(self, parts: list[ResultBuffer], liveness: LivenessHistory) -> None:
+        """Report the result rows, and remove packets that are done from the queue."""
+        if not parts:
+            return
         packets = self._packets
-        decided = self._reports.decided(parts, packets.queued, packets.table, self._poses, liveness)
-        if parts:
-            if self._params.acknowledged:
-                self._tx_status.append(final_statuses(packets.table, packets.queued.tx_status_id))
-            self._is_new |= packets.forget_done()
-        return decided
+        self._reports.report(parts, packets, self._poses, liveness)
+        if self._params.acknowledged:
+            self._tx_status.append(final_statuses(packets.table, packets.queued.rows["tx_status_id"]))
+        self._is_new |= packets.forget_done()

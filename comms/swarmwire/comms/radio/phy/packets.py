@@ -7,17 +7,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import AnyArray, IntArray
-from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_ROBOT, NO_TX_STATUS, NOWHERE, UNDER_WAY
-from swarmwire.comms.radio import links as link
-from swarmwire.comms.radio import transmissions
+from swarmwire.comms.base.arrays import AnyArray, IntArray, Table
+from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_PACKET, NO_ROBOT, NO_TX_STATUS, NOWHERE, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
-from swarmwire.comms.radio.links import fill_remainders
-from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET, Table
+from swarmwire.comms.radio.links import fill_remainder
+from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET
 from swarmwire.comms.radio.timing import IEEE_802_15_4
-from swarmwire.comms.radio.transmissions import Transmissions, frame_sizes, size_row
-from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, TxResult, TxStatuses
+from swarmwire.comms.radio.transmissions import (
+    DECIDED,
+    Admission,
+    SentColumns,
+    Transmissions,
+    admit,
+    frame_sizes,
+    size_row,
+)
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, SentPackets, TxResult, TxStatuses
 
 NO_ACKNOWLEDGEMENT, TX_TOO_LARGE = int(TxResult.NO_ACKNOWLEDGEMENT), int(TxResult.TOO_LARGE)
 
@@ -38,15 +44,16 @@ HEADER_BYTES = 6  # IEEE 802.15.4 preamble, delimiter and length, before the PSD
 
 
 class PacketTable:
-    """The packets that are not done yet.
+    """The packets that are not done yet, in two tables with the same rows.
 
     Attributes:
         queued: the packets.
-        table: their rows, of dtype PACKET.
+        table: their state in the events, of dtype PACKET.
     """
 
-    def __init__(self) -> None:
-        self.queued, self.table = Transmissions.none(), np.zeros(0, PACKET)
+    def __init__(self, rows: int) -> None:
+        self.queued, self.table = Transmissions(), np.zeros(0, PACKET)
+        self._admission = Admission(rows, self.queued)
 
     def __len__(self) -> int:
         return len(self.table)
@@ -56,29 +63,37 @@ class PacketTable:
         """True if packets are done, which `forget_done` would remove."""
         return bool(self.table["is_done"].any())
 
-    def add(self, admitted: Transmissions, frames: "Frames", robots: int) -> None:
-        """Append packets that radios admitted; each arena has `robots` robots."""
-        rows, count = packet_rows(admitted, frames, robots), len(self.table)
-        self.queued = self.queued.followed_by(admitted)
-        if not count:
-            self.table = rows
-            return
-        table = np.empty(len(self.queued), PACKET)  # faster than np.concatenate, which compares each field's type
-        table[:count], table[count:] = self.table, rows
-        self.table = table
+    def accept(
+        self,
+        sent_at_ns: IntArray,
+        sent: SentPackets,
+        others_alive: IntArray,
+        epoch: int,
+        counts: AnyArray,
+        frames: "Frames",
+    ) -> int:
+        """Append sent packets; see `admit`."""
+        table: Table = np.zeros(len(self.table) + len(sent), PACKET)
+        table.view(np.uint8)[: self.table.nbytes] = self.table.view(np.uint8)  # much faster than by fields
+        params = table, frames
+        result = self._admission.accept(_accept, sent_at_ns, sent, others_alive, epoch, counts, params)
+        if result == NO_PACKET:
+            self.table = table
+        return result
 
     def forget_done(self) -> bool:
         """Remove packets that are done, and return True if any was; recorded receptions are no longer intended."""
         unfinished, count = _settle(self.table, self.queued.table), len(self.table)
-        if not len(unfinished):
-            self.drain()
-        elif len(unfinished) < count:
-            self.queued, self.table = self.queued.select(unfinished), self.table[unfinished]
-        return len(unfinished) < count
+        if np.count_nonzero(unfinished) < count:
+            self.table = self.table[unfinished]
+            self.queued.keep(unfinished)
+        return len(self.table) < count
 
-    def drain(self) -> Transmissions:
+    def drain(self) -> Table:
         """Remove and return all packets."""
-        packets, self.queued, self.table = self.queued, Transmissions.none(), np.zeros(0, PACKET)
+        packets = self.queued.rows.copy()
+        self.queued.used[:] = 0
+        self.table = np.zeros(0, PACKET)
         return packets
 
 
@@ -100,90 +115,108 @@ def frames_of(radio: Radio) -> Frames:
     return Frames(headers_bytes, 8 * sizes, airtime_ns(radio, sizes), ifs_ns)
 
 
-def packet_rows(admitted: Transmissions, frames: Frames, robots: int) -> Table:
-    """Return rows of dtype PACKET for packets that wait at their radios, (k,); each arena has `robots` robots."""
-    packet: Table = np.zeros(len(admitted), PACKET)
-    _fill(packet, admitted.table, admitted.payloads.offset, robots, frames)
-    return packet
-
-
-@kernel(from_python=True)
-def _fill(packet: Any, admitted: AnyArray, offset: Any, robots: int, frames: Any):
-    for k in range(len(packet)):
-        row, sender, to = packet[k], admitted[transmissions.SENDER, k], admitted[transmissions.TO, k]
-        size = size_row(admitted, offset, k, frames.headers_bytes)
-        row.sender, row.sequence = sender, admitted[transmissions.SEQUENCE, k]
-        row.to = to if to in (BROADCAST, NOWHERE) else sender - sender % robots + to
-        row.sent_at_ns = row.on_air_at_ns = admitted[transmissions.SENT_AT, k]
+@njit()
+def _accept(
+    packets: Any,
+    data: Any,
+    used: Any,
+    sent: SentColumns,
+    others_alive: Any,
+    epoch: int,
+    sent_before: Any,
+    counts: Any,
+    table: Any,
+    frames: Frames,
+) -> int:
+    """Admit sent packets, see `admit`, and fill in their rows of `table` of dtype PACKET."""
+    first, robots = used[0], len(sent_before) // len(counts)
+    result = admit(packets, data, used, sent, others_alive, epoch, sent_before, counts)
+    for k in range(first, used[0]):
+        row, admitted = table[k], packets[k]
+        size, to = size_row(admitted, frames.headers_bytes), admitted.to
+        row.sender, row.sequence = admitted.sender, admitted.sequence
+        row.to = to if to in (BROADCAST, NOWHERE) else admitted.sender - admitted.sender % robots + to
+        row.sent_at_ns = row.on_air_at_ns = admitted.sent_at_ns
         row.fate = UNDER_WAY
         if size < len(frames.bits):
             row.bits, row.airtime_ns, row.ifs_ns = frames.bits[size], frames.airtime_ns[size], frames.ifs_ns[size]
             row.is_too_large, row.result = False, NO_ACKNOWLEDGEMENT
         else:
             row.is_too_large, row.result = True, TX_TOO_LARGE
+    return result
 
 
 @njit()
-def _settle(packet: Any, queued: AnyArray):
-    """Mark packets with a recorded reception, in both tables; return the rows of packets that are not done."""
-    unfinished, count = np.empty(len(packet), np.int64), 0
+def _settle(packet: Any, queued: Any):
+    """Mark packets with a recorded reception, in both tables; return True for packets that are not done."""
+    unfinished = np.empty(len(packet), np.bool_)
     for p in range(len(packet)):
         row = packet[p]
         if row.is_settled:
             row.is_departed = 1
-            queued[transmissions.INTENDED, p] = 0
-        unfinished[count] = p
-        count += row.is_done == 0
-    return unfinished[:count]
+            queued[p].intended = 0
+        unfinished[p] = row.is_done == 0
+    return unfinished
 
 
 @njit()
-def links_of_rows(queued: AnyArray, data: Any, offset: Any, packet: Any, rows: Any, is_intended: AnyArray):
-    """Return the packets with result rows, or done since, and the links of these rows.
+def append_results(
+    queued: Any,
+    queued_data: Any,
+    packet: Any,
+    rows: Any,
+    is_intended: AnyArray,
+    packets: Any,
+    data: Any,
+    used: Any,
+    links: Any,
+    link_used: Any,
+):
+    """Append the packets with result rows, or done since, and the links of these rows; return the rows, (links,).
 
-    `queued`, `data` and `offset` are the table and the payloads of the packets, in the order of the rows of `packet`;
-    `rows` is a `ResultBuffer`; `is_intended` selects its rows with an intended receiver, all if it is empty.
-
-    Of the packets it returns the table and the payloads' data and offsets; of the links the table as in `Links`, the
-    power, NaN in the remainders, and the result rows.
+    `queued` and `queued_data` are the packets in the order of the rows of `packet`, and their payloads; `rows` is a
+    `ResultBuffer`; `is_intended` selects its rows with an intended receiver, all if it is empty. The tables `packets`
+    and `links` have room.
     """
-    index_of, on_air_at_ns = np.full(len(packet), ABSENT), np.empty(len(packet), np.int64)
+    row_of_packet, on_air_at_ns = np.full(len(packet), ABSENT), np.empty(len(packet), np.int64)
     for p in range(len(packet)):
         row = packet[p]
         on_air_at_ns[p] = row.on_air_at_ns
         # The reception of a unicast packet may have been in earlier results; its sender has finished it only now.
         if row.is_done and not row.is_departed:
-            index_of[p] = 0
-    links, receiver = 0, rows.receiver
+            row_of_packet[p] = 0
+    receiver = rows.receiver
     for k in range(rows.count[0]):
-        index_of[rows.packet[k]], on_air_at_ns[rows.packet[k]] = 0, rows.on_air_at_ns[k]
-        links += receiver[k] != NO_ROBOT and (len(is_intended) == 0 or is_intended[k])
-    selected, count = np.empty(len(packet), np.int64), 0
+        row_of_packet[rows.packet[k]], on_air_at_ns[rows.packet[k]] = 0, rows.on_air_at_ns[k]
+    first, size = used[0], used[1]
     for p in range(len(packet)):
-        if index_of[p] == 0:
-            selected[count], index_of[p] = p, count
-            count += 1
-    selected = selected[:count]
-    packets = np.empty((len(queued), count), np.int64)
-    for column in range(len(queued)):
-        for k in range(count):
-            packets[column, k] = queued[column, selected[k]]
-    for k in range(count):
-        row, at_ns = packet[selected[k]], on_air_at_ns[selected[k]]
-        packets[transmissions.ON_AIR_AT, k], packets[transmissions.FATE, k] = at_ns, row.fate
-        packets[transmissions.OFF_AIR_AT, k] = at_ns + (row.airtime_ns if row.fate == UNDER_WAY else 0)
-    table, power_mw = np.empty((link.COLUMNS, links + count), np.int64), np.full(links + count, np.nan)
-    remaining, row_of, i = packets[transmissions.INTENDED].copy(), np.empty(links, np.int64), 0
+        if row_of_packet[p] == 0:
+            row_of_packet[p], reported, row = used[0], packets[used[0]], packet[p]
+            packets[used[0]] = queued[p]
+            reported.step, reported.fate, reported.first_byte = DECIDED, row.fate, size
+            reported.on_air_at_ns = reported.off_air_at_ns = on_air_at_ns[p]
+            if row.fate == UNDER_WAY:
+                reported.off_air_at_ns += row.airtime_ns
+            for i in range(reported.size_bytes):
+                data[size + i] = queued_data[queued[p].first_byte + i]
+            size += reported.size_bytes
+            used[0] += 1
+    used[1] = size
+    remaining, row_of = np.empty(used[0] - first, np.int64), np.empty(rows.count[0], np.int64)
+    for p in range(len(remaining)):
+        remaining[p] = packets[first + p].intended
+    i = link_used[0]
     for k in range(rows.count[0]):
         if receiver[k] != NO_ROBOT and (len(is_intended) == 0 or is_intended[k]):
-            p = index_of[rows.packet[k]]
-            remaining[p] -= 1
-            table[link.PACKET, i], table[link.SENDER, i] = p, packets[transmissions.SENDER, p]
-            table[link.RECEIVER, i], table[link.SEQUENCE, i] = receiver[k], packets[transmissions.SEQUENCE, p]
-            table[link.RECEIVER_COUNT, i], table[link.IN_RANGE, i] = 1, rows.in_range[k]
-            table[link.FATE, i], table[link.FINAL_AT, i] = rows.fate[k], rows.final_at_ns[k]
-            power_mw[i], row_of[i] = rows.power_mw[k], k
+            p, link = row_of_packet[rows.packet[k]], links[i]
+            remaining[p - first] -= 1
+            link.packet, link.sender, link.receiver, link.receiver_count = p, packets[p].sender, receiver[k], 1
+            link.in_range, link.fate, link.final_at_ns = rows.in_range[k], rows.fate[k], rows.final_at_ns[k]
+            row_of[i - link_used[0]] = k
             i += 1
-    fill_remainders(table, links, packets, remaining)
-    payload_data, payload_offset = transmissions.payload_rows(data, offset, selected)
-    return packets, payload_data, payload_offset, table, power_mw, row_of
+    count = i - link_used[0]
+    for p in range(first, used[0]):
+        fill_remainder(links[i], packets[p], p, remaining[p - first], 0)
+        i += 1
+    link_used[0] = i
+    return row_of[:count]

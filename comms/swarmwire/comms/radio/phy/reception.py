@@ -21,7 +21,7 @@ from swarmwire.comms.radio.phy.event_queue import OFF_AIR, schedule
 from swarmwire.comms.radio.phy.state import ACKNOWLEDGEMENT, DATA, RECEIVING, SILENT, TURNAROUND
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Model, Receiver, chunk_success
-from swarmwire.comms.radio.stages.loss import ReceivedFrame
+from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
 from swarmwire.comms.radio.stages.losses import frame_fate
 from swarmwire.comms.robot.packets import Fate
 
@@ -186,7 +186,7 @@ def end_frame(params, losses, state, events, s, now_ns):
         sender.on_air = SILENT
         return
     # Without other losses, a data frame of success 1 is received.
-    is_sure = len(losses.order) == 0 and sender.on_air == DATA
+    is_sure = not losses.has_any and sender.on_air == DATA
     first, weak, stop = np.uint64(sender.first_link), np.uint64(sender.weak_link), np.uint64(sender.stop_link)
     for i in range(first, weak):
         if link[i].fate != UNDER_WAY:

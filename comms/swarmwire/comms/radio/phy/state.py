@@ -5,9 +5,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray, Table, record_type
 from swarmwire.comms.base.sentinels import NO_FATE, NO_PACKET, NO_ROBOT, UNDER_WAY
 
 # State of a robot's MAC; it serves a packet in the states from BACKING_OFF on.
@@ -21,12 +20,7 @@ NO_RESULT = -1  # result of a packet whose sender died while it was on air
 _I, _F = np.int64, np.float64
 
 
-def _rows(fields: list[tuple[str, type]]) -> np.dtype[np.void]:
-    """Return a record type: its fields are attributes, with and without the compiler."""
-    return np.dtype((np.record, np.dtype(fields, align=True)))
-
-
-ROBOT = _rows(
+ROBOT = record_type(
     [
         # The queue: indices in `PhyState.order`.
         ("next", _I),  # first packet not served yet
@@ -62,7 +56,7 @@ ROBOT = _rows(
     ]
 )
 # State that each frame changes at each robot nearby; a row fits into one cache line.
-RECEPTION = _rows(
+RECEPTION = record_type(
     [
         ("power_mw", _F),  # sum of all frames on air here
         ("peak_mw", _F),  # CSMA: maximum of `power_mw` during the CCA
@@ -78,7 +72,7 @@ RECEPTION = _rows(
         ("is_busy", np.int8),  # DCF: latest result of carrier sense
     ]
 )
-PACKET = _rows(
+PACKET = record_type(
     [
         ("sender", _I),
         ("to", _I),  # robot row, BROADCAST or NOWHERE
@@ -99,7 +93,7 @@ PACKET = _rows(
 )
 # Links by sender: strong links, then links of interference only. Rows are small, since each frame reads its links three
 # times, and the next frame reads others.
-LINK = _rows(
+LINK = record_type(
     [
         ("power_mw", _F),  # power at the receiver, with fading
         ("receiver", np.int32),  # robot row
@@ -108,7 +102,6 @@ LINK = _rows(
         ("frame_fate", np.int8),  # fate of the frame on air, or RECEIVING
     ]
 )
-Table = NDArray[np.void]
 
 
 class LinkRanges(NamedTuple):

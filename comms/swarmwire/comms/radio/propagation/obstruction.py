@@ -134,14 +134,15 @@ def bodies_between(
     """
     counts, max_radius_m = np.empty(len(a), np.int64), radius_m.max()
     for i in range(len(a)):
-        counts[i] = _bodies_on_line(x, y, radius_m, max_radius_m, grid, robots, min(a[i], b[i]), max(a[i], b[i]))
+        counts[i] = bodies_on_line(x, y, radius_m, max_radius_m, grid, robots, min(a[i], b[i]), max(a[i], b[i]))
     return counts
 
 
 @njit()
-def _bodies_on_line(
+def bodies_on_line(
     x: AnyArray, y: AnyArray, radius_m: AnyArray, max_radius_m: float, grid: Grid, robots: int, a: int, b: int
 ):
+    """Return the number of other robots whose disc the line between rows a < b crosses; `bodies_between` for one."""
     left, bottom = min(x[a], x[b]) - max_radius_m, min(y[a], y[b]) - max_radius_m
     right, top = max(x[a], x[b]) + max_radius_m, max(y[a], y[b]) + max_radius_m
     arena, count = a // robots, 0

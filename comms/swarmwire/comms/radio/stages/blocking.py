@@ -3,19 +3,41 @@
 Disruption ends links to dead robots, to radios that are off, and across partitions.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
-from swarmwire.comms.base.geometry.robot_index import grid_over, sort
-from swarmwire.comms.base.kernels import kernel
+from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
+from swarmwire.comms.base.geometry.robot_index import Grid, grid_over, sort
+from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.context import ChannelContext
-from swarmwire.comms.radio.links import Links
-from swarmwire.comms.radio.propagation.obstruction import bodies_between
+from swarmwire.comms.radio.propagation.obstruction import bodies_on_line
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.robot.packets import Fate
+
+PARTITIONED, BLACKOUT, RECEIVER_DEAD = int(Fate.PARTITIONED), int(Fate.BLACKOUT), int(Fate.RECEIVER_DEAD)
+
+
+class SightParams(NamedTuple):
+    """Parameters of `is_out_of_sight`."""
+
+    obstacles: ObstacleIndex
+    robots: int
+    wrap_m: tuple[float, float]
+
+
+@kernel()
+def is_out_of_sight(params: Any, pose: AnyArray, sender: int, receiver: int):
+    """Return True if an obstacle blocks the line between two robot rows."""
+    if params is None:
+        return False
+    # From the lower row to the higher, so that both directions of a link agree to the last bit.
+    a, b = min(sender, receiver), max(sender, receiver)
+    ax, ay, bx, by = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
+    return is_blocked(params.obstacles, a // params.robots, ax, ay, bx, by, params.wrap_m[0], params.wrap_m[1])
 
 
 class LineOfSight(Stage):
@@ -32,42 +54,47 @@ class LineOfSight(Stage):
     def __init__(self, context: ChannelContext) -> None:
         self._obstacles, self._robots, self._wrap_m = context.obstacles, context.robots, context.wrap_m
 
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """End blocked links, which were not in range."""
-        _end_blocked(links, self.blocked(pose, links.sender, links.receiver))
+    def params(self, pose: FloatArray) -> SightParams:
+        """Return the input of the kernel."""
+        return SightParams(self._obstacles.now(), self._robots, self._wrap_m)
 
-    def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
+    def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray) -> FloatArray:
         """Return 0 for blocked links, else 1."""
-        return (~self.blocked(pose, links.sender, links.receiver)).astype(np.float64)
+        return 1.0 - self.blocked(pose, sender, receiver)
 
     def blocked(self, pose: FloatArray, a: IntArray, b: IntArray) -> BoolArray:
         """Return True where an obstacle blocks the line between robot rows, (k,)."""
-        blocked = np.empty(len(a), np.bool_)
-        _block(blocked, self._obstacles.now(), self._robots, *self._wrap_m, pose, a, b)
-        return blocked
+        return _are_out_of_sight(self.params(pose), pose, a, b)
 
 
-def _end_blocked(links: Links, is_blocked: BoolArray) -> None:
-    links.fate[is_blocked] = Fate.BLOCKED
-    links.in_range[is_blocked] = 0
+@njit()
+def _are_out_of_sight(params: Any, pose: AnyArray, a: AnyArray, b: AnyArray):
+    blocked = np.empty(len(a), np.bool_)
+    for i in range(len(a)):
+        blocked[i] = is_out_of_sight(params, pose, a[i], b[i])
+    return blocked
 
 
-@kernel(from_python=True)
-def _block(
-    blocked: AnyArray,
-    obstacles: Any,
-    robots: int,
-    wrap_x: float,
-    wrap_y: float,
-    pose: AnyArray,
-    sender: AnyArray,
-    receiver: AnyArray,
-):
-    for i in range(len(blocked)):
-        # From the lower row to the higher, so that both directions of a link agree to the last bit.
-        a, b = min(sender[i], receiver[i]), max(sender[i], receiver[i])
-        ax, ay, bx, by = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
-        blocked[i] = is_blocked(obstacles, a // robots, ax, ay, bx, by, wrap_x, wrap_y)
+class BodyParams(NamedTuple):
+    """Parameters of `is_behind_bodies`."""
+
+    x: FloatArray  # (rows,)
+    y: FloatArray  # (rows,)
+    radius_m: FloatArray  # (rows,)
+    max_radius_m: float
+    grid: Grid  # sorted
+    robots: int
+
+
+@kernel()
+def is_behind_bodies(params: Any, sender: int, receiver: int):
+    """Return True if the disc of a third robot covers a point of the line between two robot rows."""
+    if params is None:
+        return False
+    a, b = min(sender, receiver), max(sender, receiver)
+    return (
+        bodies_on_line(params.x, params.y, params.radius_m, params.max_radius_m, params.grid, params.robots, a, b) > 0
+    )
 
 
 class BodiesBlock(Stage):
@@ -80,7 +107,7 @@ class BodiesBlock(Stage):
     keys = ("bodies_block",)
 
     @classmethod
-    def create(cls, context: ChannelContext) -> Stage | None:
+    def create(cls, context: ChannelContext) -> "BodiesBlock | None":
         """Return the stage if `bodies_block` is set and robots have bodies."""
         return BodiesBlock(context) if context.radio.bodies_block and context.radius_m.any() else None
 
@@ -89,19 +116,53 @@ class BodiesBlock(Stage):
         self._running, self._robots, self._radius_m = context.running, context.robots, context.radius_m
         arenas, rows = len(context.keys), len(context.radius_m)
         self._grid = grid_over(context.size_m, context.radio.range_m, arenas, rows, clamps=True)
+        self._max_radius_m = float(context.radius_m.max())
 
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """End blocked links, which were not in range."""
-        _end_blocked(links, self._blocked(links, pose))
-
-    def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
-        """Return 0 for blocked links, else 1."""
-        return (~self._blocked(links, pose)).astype(np.float64)
-
-    def _blocked(self, links: Links, pose: FloatArray) -> BoolArray:
+    def params(self, pose: FloatArray) -> BodyParams:
+        """Return the input of the kernel for robots at `pose` (rows, 3)."""
         x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
         sort(self._grid, pose.reshape(len(self._running), self._robots, pose.shape[1]), self._running)
-        return bodies_between(x, y, self._radius_m, self._grid, self._robots, links.sender, links.receiver) > 0
+        return BodyParams(x, y, self._radius_m, self._max_radius_m, self._grid, self._robots)
+
+    def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray) -> FloatArray:
+        """Return 0 for blocked links, else 1."""
+        return _past_bodies(self.params(pose), sender, receiver)
+
+
+@njit()
+def _past_bodies(params: Any, a: AnyArray, b: AnyArray):
+    passes = np.empty(len(a))
+    for i in range(len(a)):
+        passes[i] = 0.0 if is_behind_bodies(params, a[i], b[i]) else 1.0
+    return passes
+
+
+@kernel()
+def disrupted_fate(cuts: Any, sender: int, receiver: int):
+    """Return the fate by the active disruption: RECEIVER_DEAD before BLACKOUT before PARTITIONED; else UNDER_WAY.
+
+    Senders that are dead or off end packets at their queue.
+    """
+    if not cuts.alive[receiver]:
+        return RECEIVER_DEAD
+    if not cuts.radio_on[receiver]:
+        return BLACKOUT
+    for k in range(len(cuts.sides)):
+        a, b = cuts.sides[k, sender], cuts.sides[k, receiver]
+        if a != b and a > 0 and b > 0:
+            return PARTITIONED
+    for k in range(len(cuts.one_way)):
+        if cuts.one_way[k, sender] == 1 and cuts.one_way[k, receiver] == 2:
+            return PARTITIONED
+    return UNDER_WAY
+
+
+@kernel(from_python=True)
+def end_disrupted(cuts: Any, fate: AnyArray, sender: AnyArray, receiver: AnyArray):
+    """Set the fates (k,) of links between robot rows that are UNDER_WAY and that the disruption ends; in place."""
+    for i in range(len(fate)):
+        if fate[i] == UNDER_WAY:
+            fate[i] = disrupted_fate(cuts, sender[i], receiver[i])
 
 
 class Disrupted(Stage):
@@ -118,15 +179,11 @@ class Disrupted(Stage):
     def __init__(self, context: ChannelContext) -> None:
         self._disruption = context.disruption
 
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """End links by `Disruption.end_links`."""
-        self._disruption.end_links(links.fate, links.sender, links.receiver)
-
     @property
     def passes_all(self) -> bool:
         """True if no disruption is active."""
         return not self._disruption.is_active
 
-    def delivery(self, links: Links, pose: FloatArray) -> FloatArray:
+    def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray) -> FloatArray:
         """Return 0 if a radio is off or a partition separates the two, else 1; the graph excludes dead robots."""
-        return self._disruption.connects(links.sender, links.receiver).astype(np.float64)
+        return self._disruption.connects(sender, receiver).astype(np.float64)

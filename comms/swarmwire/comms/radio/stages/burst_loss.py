@@ -19,12 +19,12 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import purpose
-from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.context import ChannelContext
+from swarmwire.comms.radio.stages.link_draws import loss_uniform
 from swarmwire.comms.radio.stages.loss import FrameLoss
 from swarmwire.comms.robot.packets import Fate
 
@@ -80,6 +80,8 @@ def _slot(links, link):
 @kernel()
 def burst_loss(params, frame):
     """Return BURST by the link's state, which changes with the time since its last frame."""
+    if params is None:
+        return UNDER_WAY
     a, b = frame.sender, frame.receiver
     if params.symmetric:
         a, b = min(a, b), max(a, b)
@@ -91,26 +93,11 @@ def burst_loss(params, frame):
         params.links[0] += 1
     else:
         silent_s = abs(frame.at_ns - params.at_ns[slot]) / NS_PER_S
-    u = uniform(frame.key, frame.s, frame.r, frame.sequence, (ACK_STATE if frame.is_ack else STATE) + frame.attempt)
+    u = loss_uniform(frame, STATE, ACK_STATE)
     bad = bad_after(params.bad[slot], silent_s, params.a, params.b, u)
     if frame.at_ns >= params.at_ns[slot]:
         params.at_ns[slot], params.bad[slot] = frame.at_ns, bad
-    u = uniform(frame.key, frame.s, frame.r, frame.sequence, (ACK_LOSS if frame.is_ack else LOSS) + frame.attempt)
-    return BURST if u < (params.loss_bad if bad else params.loss_good) else UNDER_WAY
-
-
-NO_BURSTS = BurstParams(
-    0,
-    False,
-    np.empty(0, np.int64),
-    np.empty(0, np.int64),
-    np.empty(0, np.bool_),
-    np.zeros(1, np.int64),
-    1.0,
-    1.0,
-    0.0,
-    0.0,
-)
+    return BURST if loss_uniform(frame, LOSS, ACK_LOSS) < (params.loss_bad if bad else params.loss_good) else UNDER_WAY
 
 
 class BurstLoss(FrameLoss):
@@ -122,7 +109,6 @@ class BurstLoss(FrameLoss):
 
     name = "burst_loss"
     keys = ("bursts",)
-    no_params = NO_BURSTS
     has_state = True
 
     @classmethod

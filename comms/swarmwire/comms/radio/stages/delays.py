@@ -4,22 +4,20 @@ Each varying delay is a quantile of one uniform draw.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from swarmwire.comms.base import math as portable
-from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import NS_PER_S, to_ns
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import normal_quantile
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
-from swarmwire.comms.radio.links import RECEIVED, Links
-from swarmwire.comms.radio.stages.link_draws import LinkDraws, uniform_of_link
-from swarmwire.comms.radio.stages.measurements import to_sender_m
+from swarmwire.comms.radio.stages.link_draws import link_uniform
 from swarmwire.comms.radio.stages.stage import Stage
 
 UNIFORM, NORMAL, LOGNORMAL, PARETO = range(4)
@@ -29,7 +27,7 @@ DELAY, DELAYS = purpose("delay"), purpose("delays")
 
 
 class DelayDistribution(NamedTuple):
-    """Parameters of a delay distribution, as input of kernels."""
+    """Parameters of a delay distribution."""
 
     distribution: int
     first: float
@@ -77,34 +75,38 @@ def varying_delay_ns(params: Any, u: float):
     return int(min(delay_s * NS_PER_S, MAX_NS))
 
 
+@kernel()
+def latency_ns(params: Any, frame: Any):
+    """Return latency + floor(u x jitter) in ns."""
+    if params.jitter_ns == 0:
+        return params.latency_ns
+    return params.latency_ns + np.int64(link_uniform(frame, DELAY) * params.jitter_ns)
+
+
 class Latency(Stage):
     """`received_at = off_air_at + latency + U[0, jitter)`, in integer ns."""
 
     name = "latency"
     keys = ("latency_s", "jitter_s")
+    FIELDS: ClassVar = [("latency_ns", np.int64), ("jitter_ns", np.int64)]
 
     @classmethod
     def create(cls, context: ChannelContext) -> Stage | None:
         """Return the stage if the radio has latency or jitter."""
-        return Latency(context) if context.radio.latency_s > 0.0 or context.radio.jitter_s > 0.0 else None
+        return Latency(context.radio) if context.radio.latency_s > 0.0 or context.radio.jitter_s > 0.0 else None
 
-    def __init__(self, context: ChannelContext) -> None:
-        self._latency_ns, self._jitter_ns = to_ns(context.radio.latency_s), to_ns(context.radio.jitter_s)
-        self._draws = LinkDraws(context.keys, context.robots)
+    def __init__(self, radio: Radio) -> None:
+        self._latency_ns, self._jitter_ns = to_ns(radio.latency_s), to_ns(radio.jitter_s)
 
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """Delay received links."""
-        add_latency(links.final_at_ns, self._draws, links.columns, self._latency_ns, self._jitter_ns)
+    def write(self, params: Any) -> None:
+        """Set latency and jitter."""
+        params.latency_ns, params.jitter_ns = self._latency_ns, self._jitter_ns
 
 
-@kernel(from_python=True)
-def add_latency(at_ns: AnyArray, draws: Any, links: Any, latency_ns: int, jitter_ns: int):
-    """Add latency + floor(u x jitter) to the times `at_ns` (k,) of received links, u keyed by link."""
-    for i in range(len(at_ns)):
-        if links.fate[i] == RECEIVED:
-            at_ns[i] += latency_ns
-            if jitter_ns > 0:
-                at_ns[i] += np.int64(uniform_of_link(draws, links, i, DELAY) * jitter_ns)
+@kernel()
+def frame_delay_ns(params: Any, frame: Any):
+    """Return a delay by the distribution, in ns; 0 without one."""
+    return varying_delay_ns(params, link_uniform(frame, DELAYS)) if params.is_used else 0
 
 
 class VaryingDelay(Stage):
@@ -112,27 +114,31 @@ class VaryingDelay(Stage):
 
     name = "varying_delay"
     keys = ("delays",)
+    FIELDS: ClassVar = [
+        ("is_used", np.bool_),
+        ("distribution", np.int64),
+        *((name, np.float64) for name in DelayDistribution._fields[1:]),
+    ]
 
     @classmethod
     def create(cls, context: ChannelContext) -> Stage | None:
         """Return the stage if the radio has such delays."""
-        return VaryingDelay(context) if context.radio.delays is not None else None
+        delays = context.radio.delays
+        return None if delays is None else VaryingDelay(delay_distribution(delays))
 
-    def __init__(self, context: ChannelContext) -> None:
-        assert context.radio.delays is not None
-        self._params, self._draws = delay_distribution(context.radio.delays), LinkDraws(context.keys, context.robots)
+    def __init__(self, distribution: DelayDistribution) -> None:
+        self._distribution = distribution
 
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """Delay received links."""
-        add_varying_delay(links.final_at_ns, self._params, self._draws, links.columns)
+    def write(self, params: Any) -> None:
+        """Set the distribution."""
+        params.is_used = True
+        params.distribution, params.first, params.second, params.third = self._distribution
 
 
-@kernel(from_python=True)
-def add_varying_delay(at_ns: AnyArray, params: Any, draws: Any, links: Any):
-    """Add a delay by the distribution to the times `at_ns` (k,) of received links, u keyed by link."""
-    for i in range(len(at_ns)):
-        if links.fate[i] == RECEIVED:
-            at_ns[i] += varying_delay_ns(params, uniform_of_link(draws, links, i, DELAYS))
+@kernel()
+def propagation_delay_ns(params: Any, distance_m: float):
+    """Return distance / speed in whole ns (rounded down); 0 without a speed."""
+    return np.int64(distance_m / params.speed_mps * NS_PER_S) if params.speed_mps > 0.0 else 0
 
 
 class PropagationDelay(Stage):
@@ -140,25 +146,17 @@ class PropagationDelay(Stage):
 
     name = "propagation_delay"
     keys = ("propagation_mps",)
+    FIELDS: ClassVar = [("speed_mps", np.float64)]
 
     @classmethod
     def create(cls, context: ChannelContext) -> Stage | None:
         """Return the stage if the radio sets a propagation speed."""
         speed_mps = context.radio.propagation_mps
-        return None if speed_mps is None else PropagationDelay(speed_mps, context.wrap_m)
+        return None if speed_mps is None else PropagationDelay(speed_mps)
 
-    def __init__(self, speed_mps: float, wrap_m: tuple[float, float]) -> None:
-        self._speed_mps, self._wrap_m = speed_mps, wrap_m
+    def __init__(self, speed_mps: float) -> None:
+        self._speed_mps = speed_mps
 
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """Delay received links."""
-        add_propagation_delay(links.final_at_ns, pose, links.columns, self._speed_mps, self._wrap_m)
-
-
-@kernel(from_python=True)
-def add_propagation_delay(at_ns: AnyArray, pose: Any, links: Any, speed_mps: float, wrap_m: tuple[float, float]):
-    """Add the time of propagation in whole ns (rounded down) to the times `at_ns` (k,) of received links."""
-    for i in range(len(at_ns)):
-        if links.fate[i] == RECEIVED:
-            dx, dy = to_sender_m(pose, links.sender[i], links.receiver[i], wrap_m)
-            at_ns[i] += np.int64(np.sqrt(dx * dx + dy * dy) / speed_mps * NS_PER_S)
+    def write(self, params: Any) -> None:
+        """Set the speed."""
+        params.speed_mps = self._speed_mps

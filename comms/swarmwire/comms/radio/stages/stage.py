@@ -1,53 +1,39 @@
 """The interface of a channel stage."""
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.radio.context import ChannelContext
-from swarmwire.comms.radio.links import Links
 
 
 class Stage(ABC):
-    """One step of a packet on its way from the sender's radio to one receiver; for a loss see `FrameLoss`."""
+    """One step of a packet on its way from the sender's radio to one receiver; for a loss see `FrameLoss`.
+
+    Beside it is a kernel for one link, which `chain.py` calls.
+    """
 
     name: ClassVar[str]  # its name in `swarmwire describe`
     keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
+    # Fields of its record in the parameters of the chain; all 0, they have no effect.
+    FIELDS: ClassVar[list[tuple[Any, ...]]] = []
 
     @classmethod
     @abstractmethod
     def create(cls, context: ChannelContext) -> "Stage | None":
         """Return the stage for this medium; None if its radio does not need it."""
 
-    @abstractmethod
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """Set the fate of links that end here, or change columns of the others; in place.
-
-        A stage before reception works on links that are UNDER_WAY, one after it on links that are RECEIVED. One that
-        ends a link before reception also sets its `in_range` to 0. `pose` (rows, 3) is that at `on_air_at_ns`: x, y in
-        m, heading in rad.
-        """
-
-    def count_in_range(self, links: Links, pose: FloatArray) -> None:
-        """Set `in_range` of packets that never go on air, without a change of state; by default by `decide`."""
-        self.decide(links, pose)
-
-    def continue_from(self, previous: "Stage", at_ns: int) -> None:  # noqa: B027 - most stages have no state
-        """Copy the state of `previous`, the same stage with the radio parameters valid until `at_ns`."""
-
-    @property
-    def has_delivery(self) -> bool:
-        """True if the stage has a `delivery` of its own."""
-        return type(self).delivery is not Stage.delivery
+    def write(self, params: Any) -> None:  # noqa: B027 - some stages have arrays in place of a record
+        """Set the fields of `params`, its record."""
 
     @property
     def passes_all(self) -> bool:
         """True if `delivery` is 1 for all links at the moment; it is then not called."""
-        return False
+        return type(self).delivery is Stage.delivery
 
-    def delivery(self, links: Links, pose: FloatArray) -> FloatArray | float:
-        """Return the probability that lone packets pass, without fast fading, for the radio graph.
+    def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray) -> FloatArray:
+        """Return the probability that lone packets pass between robot rows, for the radio graph, (k,).
 
-        One number for each link, (k,), or for all: that of the worse direction. `final_at_ns` is the time of the graph.
+        It is that of the worse direction, without fast fading.
         """
-        return 1.0
+        raise NotImplementedError

@@ -10,11 +10,10 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import purpose
-from swarmwire.comms.base.draws_compiled import uniform
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.context import ChannelContext
-from swarmwire.comms.radio.links import Links
+from swarmwire.comms.radio.stages.link_draws import loss_uniform
 from swarmwire.comms.radio.stages.loss import FrameLoss
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.radio.traces import NO_VALUES, LinkTrace, LinkTraces, TraceValues, value_at
@@ -36,14 +35,14 @@ class TraceParams(NamedTuple):
 @kernel()
 def trace_loss(params: Any, frame: Any):
     """Return OUT_OF_RANGE for a link without a value, unless the model serves it; LOST if u >= ratio."""
+    if params is None:
+        return UNDER_WAY
     link = frame.s * params.robots + frame.r
     if params.others_end and np.isnan(value_at(params.first, link, frame.trace_ns)):
         return OUT_OF_RANGE
     ratio = value_at(params.ratio, link, frame.trace_ns)
-    if ratio < 1.0:  # False for NaN: no ratio was measured
-        trace = ACK_TRACE if frame.is_ack else TRACE
-        if uniform(frame.key, frame.s, frame.r, frame.sequence, trace + frame.attempt) >= ratio:
-            return LOST
+    if ratio < 1.0 and loss_uniform(frame, TRACE, ACK_TRACE) >= ratio:  # False for NaN: no ratio was measured
+        return LOST
     return UNDER_WAY
 
 
@@ -56,7 +55,6 @@ class TraceLoss(FrameLoss):
 
     name = "trace_loss"
     keys = ("trace",)
-    no_params = TraceParams(0, False, NO_VALUES, NO_VALUES)
     varies = True
 
     @classmethod
@@ -86,6 +84,22 @@ class TraceLoss(FrameLoss):
         return ratio * self._traces.has_values(s, r, times_ns) if self._others_end else ratio
 
 
+class TraceDelayParams(NamedTuple):
+    """The measured delays of each arena, as input of the kernel."""
+
+    robots: int  # robots per arena
+    delay_s: TraceValues
+
+
+@kernel()
+def trace_delay_ns(params: Any, frame: Any, at_ns: int):
+    """Return the delay measured on the frame's link at a time, rounded to ns; 0 if none was measured."""
+    if params is None:
+        return 0
+    delay_s = value_at(params.delay_s, frame.s * params.robots + frame.r, at_ns)
+    return 0 if np.isnan(delay_s) else np.int64(np.rint(delay_s * NS_PER_S))
+
+
 class TraceDelay(Stage):
     """Adds the measured delay of the link at the end of the airtime to `received_at`."""
 
@@ -93,17 +107,9 @@ class TraceDelay(Stage):
     keys = ("trace",)
 
     @classmethod
-    def create(cls, context: ChannelContext) -> Stage | None:
-        """Return the stage if the radio has a trace with delays."""
-        traces = context.traces
-        return None if traces is None or traces.delay_s is None else TraceDelay(traces.delay_s, context.robots)
+    def create(cls, context: ChannelContext) -> "TraceDelay | None":
+        """Return the stage if the radio has a trace; without delays it has no effect."""
+        return None if context.traces is None else TraceDelay(context.traces.delay_s, context.robots)
 
-    def __init__(self, delay_s: LinkTrace, robots: int) -> None:
-        self._delay_s, self._robots = delay_s, robots
-
-    def decide(self, links: Links, pose: FloatArray) -> None:
-        """Delay received links."""
-        sender, receiver = links.sender % self._robots, links.receiver % self._robots
-        delay_s = np.nan_to_num(self._delay_s.values_at(sender, receiver, links.final_at_ns))
-        delays_ns = np.where(links.fate == RECEIVED, np.round(delay_s * NS_PER_S), 0.0)
-        np.add(links.final_at_ns, delays_ns.astype(np.int64), out=links.final_at_ns)
+    def __init__(self, delay_s: LinkTrace | None, robots: int) -> None:
+        self.params = TraceDelayParams(robots, NO_VALUES if delay_s is None else delay_s.values)

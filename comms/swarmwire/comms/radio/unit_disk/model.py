@@ -1,139 +1,166 @@
-"""The unit disk as a radio model: queues of the senders, links in range, then the chain of stages.
+"""The unit disk as a radio model: queues of the senders, then one walk over the links in range.
 
 The fates of a packet are decided when it goes on air, since later packets do not change them.
 """
 
+# pyright: basic, reportUnknownMemberType=false
+
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
-from swarmwire.comms.base.clock import NEVER_NS
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray, Table
 from swarmwire.comms.base.geometry.robot_index import Grid, grid_over
-from swarmwire.comms.base.sentinels import BROADCAST, UNDER_WAY
+from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.links import Links
+from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, Links, fill_remainder
 from swarmwire.comms.radio.liveness import LivenessHistory
-from swarmwire.comms.radio.model import Decided, RadioModel, edges_above
-from swarmwire.comms.radio.stages.chain import chain
-from swarmwire.comms.radio.stages.stage import Stage
-from swarmwire.comms.radio.transmissions import Transmissions
-from swarmwire.comms.radio.unit_disk.neighbours import (
-    Neighbours,
-    find_neighbours,
-    links_in_range,
-    pairs_in_range,
+from swarmwire.comms.radio.model import RadioModel, edges_above
+from swarmwire.comms.radio.stages.blocking import BodiesBlock, Disrupted, LineOfSight
+from swarmwire.comms.radio.stages.chain import (
+    BLOCKED,
+    StagesBefore,
+    after_reception,
+    fate_before_reception,
+    stages_after,
 )
-from swarmwire.comms.radio.unit_disk.tx_queue import TxQueues
+from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
+from swarmwire.comms.radio.stages.losses import NO_TRACE_NS, LossChain
+from swarmwire.comms.radio.transmissions import DECIDED, WAITING, Transmissions
+from swarmwire.comms.radio.unit_disk.neighbours import Neighbours, find_neighbours, pairs_in_range
+from swarmwire.comms.radio.unit_disk.tx_queue import TOO_LARGE, TxQueues, leave_queue
 from swarmwire.comms.robot.packets import SentPackets
 
-
-def _grid_of(context: ChannelContext) -> Grid:
-    """Return the grid in which the robots in range of a robot are in its cell or in adjacent ones."""
-    assert context.radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
-    arenas, clamps = len(context.keys), not context.is_torus
-    return grid_over(context.size_m, context.radio.range_m, arenas, arenas * context.robots, clamps)
+NO_ORDER = np.empty(0, np.int64)
+ALREADY_DUE_NS = -1  # no packet becomes due by this time
 
 
-class Channel:
-    """Decides the fate of packets at robots with given poses; pose arrays must not change afterwards."""
+@njit(nogil=True)
+def decide(
+    until_ns: int,
+    order: AnyArray,
+    packets: Any,
+    used: Any,
+    links: Any,
+    link_used: Any,
+    neighbours: Neighbours,
+    pose: AnyArray,
+    keys: AnyArray,
+    alive_in: AnyArray,
+    first_epoch: int,
+    cuts: Any,
+    before: Any,
+    after: Any,
+):
+    """Decide the fates of the packets that leave their queue before `until_ns`, or are DUE, at each receiver in range.
 
-    def __init__(self, context: ChannelContext) -> None:
-        self._radio, self._wrap_m = context.radio, context.wrap_m
-        self._arenas, self._running, self._grid = len(context.keys), context.running, _grid_of(context)
-        self._columns = len(context.radio.measures.columns)
-        self._set_stages(chain(context))
+    Append a link for each, and then a row per packet for the remainder. Return the number of packets that wait; or, if
+    the table of links lacks room, minus the number of rows to append, and nothing is decided.
 
-    def tune(self, at_ns: int, context: ChannelContext) -> None:
-        """Use the radio parameters of `context` from `at_ns` on; stages keep their state."""
-        previous = {type(stage): stage for stage in self._stages}
-        self._radio, self._grid = context.radio, _grid_of(context)
-        self._set_stages(chain(context))
-        for stage in self._stages:
-            if type(stage) in previous:
-                stage.continue_from(previous[type(stage)], at_ns)
+    Args:
+        until_ns: the end of the time that passes.
+        order: packets in the order of their tests, (packets,); empty: in the order of their rows.
+        packets: the table of packets.
+        used: number of packets.
+        links: the table of links.
+        link_used: number of links.
+        neighbours: robots in range.
+        pose: poses of the robots, (rows, 3).
+        keys: keys of draws, (arenas,).
+        alive_in: robots that were alive in each epoch, (epochs, rows).
+        first_epoch: the first epoch in `alive_in`.
+        cuts: the active disruption.
+        before: `StagesBefore`.
+        after: `StagesAfter`.
+    """
+    first, other, robots = neighbours.first, neighbours.other, len(pose) // len(keys)
+    row = np.full(used[0], ABSENT)  # first link of each packet that is due
+    in_range, remaining = np.zeros(used[0], np.int64), np.empty(used[0], np.int64)
+    end, due, waiting = link_used[0], 0, 0
+    for p in range(used[0]):
+        packet = packets[p]
+        if not leave_queue(packet, until_ns, cuts):
+            waiting += packet.step == WAITING
+            continue
+        s, row[p], remaining[p], due = packet.sender, end, packet.intended, due + 1
+        if packet.fate == UNDER_WAY:
+            for k in range(first[s], first[s + 1]):
+                end += is_intended(packet, other[k], robots, alive_in, first_epoch)
+    if end + due > len(links):
+        return link_used[0] - end - due
+    for q in range(used[0]):
+        p = order[q] if len(order) > 0 else q
+        packet, i = packets[p], row[p]
+        if i == ABSENT or packet.fate == TOO_LARGE:
+            continue
+        s, at_ns, goes_on_air = np.int64(packet.sender), packet.off_air_at_ns, packet.fate == UNDER_WAY
+        arena = s // robots
+        first_row = arena * robots
+        for k in range(first[s], first[s + 1]):
+            r = other[k]
+            if not is_intended(packet, r, robots, alive_in, first_epoch):
+                continue
+            frame = ReceivedFrame(
+                keys[arena], s, r, s - first_row, r - first_row, packet.sequence, 0, False, at_ns, at_ns
+            )
+            fate = fate_before_reception(before, cuts, pose, frame, goes_on_air)
+            is_in_range = fate not in (BLOCKED, OUT_OF_RANGE)
+            in_range[p] += is_in_range
+            if goes_on_air:
+                link = links[np.uint64(i)]
+                i += 1
+                link.packet, link.sender, link.receiver, link.receiver_count = p, s, r, 1
+                link.in_range, link.final_at_ns, link.rssi_dbm = is_in_range, at_ns, np.nan
+                link.fate = RECEIVED if fate == UNDER_WAY else fate
+                if fate == UNDER_WAY:
+                    after_reception(after, pose, frame, link)
+        remaining[p] -= i - row[p]
+    for p in range(used[0]):
+        if row[p] != ABSENT:
+            packet = packets[p]
+            packet.step = DECIDED
+            fill_remainder(links[end], packet, p, remaining[p], in_range[p] if packet.fate != UNDER_WAY else 0)
+            end += 1
+    link_used[0] = end
+    return waiting
 
-    def _set_stages(self, stages: tuple[Stage, ...]) -> None:
-        self._stages, self._stages_with_delivery = stages, [stage for stage in stages if stage.has_delivery]
-        self._neighbours_pose: FloatArray | None = None  # poses of the cached `_neighbours`
 
-    def decide(self, packets: Transmissions, pose: FloatArray, liveness: LivenessHistory) -> Links:
-        """Decide the fate of each packet at each receiver in range, with robots at `pose`, and return the links.
-
-        Packets that end at the sender's radio only count their receivers in range.
-        """
-        # Robots that are dead now are included: the intended receivers are the robots that were alive when the packet
-        # was sent, and the others are removed below.
-        robots = len(pose) // self._arenas
-        packet, receiver = links_in_range(*self._in_range(pose), robots, packets.table)
-        if liveness.any_dead:
-            is_intended = liveness.intended(packets.epoch[packet], receiver) | (packets.to[packet] != BROADCAST)
-            packet, receiver = packet[is_intended], receiver[is_intended]
-        in_range = np.zeros(len(packets), np.int64)
-        is_refused_packet = packets.fate != UNDER_WAY
-        if np.count_nonzero(is_refused_packet):
-            is_refused = is_refused_packet[packet]
-            in_range = self._count_in_range(packets, packet[is_refused], receiver[is_refused], pose)
-            packet, receiver = packet[~is_refused], receiver[~is_refused]
-        links = Links.with_remainders(packets, packet, receiver, in_range, self._columns)
-        open_links = links.first(len(packet))
-        for stage in self._stages:
-            stage.decide(open_links, pose)
-        return links
-
-    def _count_in_range(
-        self, packets: Transmissions, packet: IntArray, receiver: IntArray, pose: FloatArray
-    ) -> IntArray:
-        """Return the number of receivers in range of packets that never go on air, (packets,)."""
-        zero = np.zeros(len(packets), np.int64)
-        links = Links.with_remainders(packets, packet, receiver, zero, self._columns).first(len(packet))
-        for stage in self._stages:
-            stage.count_in_range(links, pose)
-        in_range = zero.copy()
-        np.add.at(in_range, links.packet, links.in_range)
-        return in_range
-
-    def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
-        """Return the edges of the radio graph at `at_ns`: robot rows a < b, sorted, (e, 2)."""
-        pairs = pairs_in_range(self._in_range(pose), alive)
-        stages = [stage for stage in self._stages_with_delivery if not stage.passes_all]
-        if not stages:
-            return pairs
-        zero = np.zeros(len(pairs), np.int64)
-        a, b = np.ascontiguousarray(pairs.T)
-        links = Links.under_way(zero, a, b, zero, np.full(len(pairs), at_ns), 0)
-        probability = np.ones(len(pairs))
-        for stage in stages:
-            probability *= stage.delivery(links, pose)
-        return edges_above(pairs, probability, self._radio.min_delivery)
-
-    def _in_range(self, pose: FloatArray) -> Neighbours:
-        """Return the robots in range of each other, cached for the packets and the radio graph of a tick."""
-        if pose is not self._neighbours_pose:
-            assert self._radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
-            self._neighbours = find_neighbours(self._grid, pose, self._running, self._wrap_m, self._radio.range_m)
-            self._neighbours_pose = pose
-        return self._neighbours
+@kernel()
+def is_intended(packet: Any, receiver: int, robots: int, alive_in: AnyArray, first_epoch: int):
+    """Return True for a robot to which the packet is addressed, or that was alive when it was broadcast."""
+    if packet.to == BROADCAST:
+        return alive_in[packet.epoch - first_epoch, receiver]
+    return receiver == packet.sender - packet.sender % robots + packet.to
 
 
 class UnitDisk(RadioModel):
-    """A transmit queue for each sender, then the channel."""
+    """A transmit queue for each sender, then the channel; pose arrays must not change."""
 
-    def __init__(self, context: ChannelContext) -> None:
-        self._context = context
-        self._queues = TxQueues(context.radio, context.rows)
-        self._channel = Channel(context)
+    def __init__(self, context: ChannelContext, packets: Transmissions, links: Links) -> None:
+        self._context, self._packets, self._links = context, packets, links
+        self._queues = TxQueues(context.radio, context.rows, packets)
+        self._losses = LossChain.create(context)
         self._pose = np.zeros((context.rows, 3))
-        self._disruption = context.disruption
-        self._no_links = Links.none(len(context.radio.measures.columns))
-        self._now_ns = 0  # pragma: no mutate (each step sets it first)
+        self._now_ns = 0
+        self._waiting = 0  # packets in the queues, or more
+        self._use(context)
+
+    def _use(self, context: ChannelContext) -> None:
+        self._radio, self._grid = context.radio, _grid_of(context)
+        self._sight, self._bodies = LineOfSight.create(context), BodiesBlock.create(context)
+        self._with_delivery = [stage for stage in (self._sight, self._bodies, Disrupted(context)) if stage is not None]
+        self._after = stages_after(context)
+        self._neighbours_pose: FloatArray | None = None  # poses of the cached `_neighbours`
 
     @property
-    def queued(self) -> Transmissions:
-        """Packets that wait in queues."""
-        return self._queues.queued
+    def queued(self) -> Table:
+        """Packets that wait in queues, of type PACKET."""
+        rows = self._packets.rows
+        return rows[rows["step"] == WAITING]
 
     def set_poses(self, pose: FloatArray) -> None:
         """Use `pose` (rows, 3) for packets that go on air from now on."""
@@ -142,32 +169,80 @@ class UnitDisk(RadioModel):
     def tune(self, at_ns: int, radio: Radio) -> None:
         """Use the parameters of `radio` for packets sent, or on air, from `at_ns` on."""
         self._queues.tune(radio)
-        self._channel.tune(at_ns, replace(self._context, radio=radio))
+        context = replace(self._context, radio=radio)
+        self._losses.tune(context, at_ns)
+        self._use(context)
 
-    def accept(self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int) -> Transmissions:
+    def accept(
+        self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int, counts: AnyArray
+    ) -> int:
         """Queue packets, with their time on air or their refusal."""
-        return self._queues.accept(sent_at_ns, sent, others_alive, epoch)
+        self._waiting += len(sent)
+        return self._queues.accept(sent_at_ns, sent, others_alive, epoch, counts)
 
-    def pass_time(self, until_ns: int, liveness: LivenessHistory) -> Decided:
+    def pass_time(self, until_ns: int, liveness: LivenessHistory) -> None:
         """Decide the fates of packets that go on air, or are refused, before `until_ns`."""
+        if self._waiting:
+            self._decide(until_ns, liveness)
         self._now_ns = until_ns
-        return self._decide(self._queues.pop_due(until_ns, self._disruption), liveness)
 
-    def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> Decided:
+    def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> None:
         """End the queues of dead robots and pause those of radios that are off; packets on air have their fates."""
-        decided = self._decide(self._queues.pop_dead(at_ns, disruption.alive), liveness)
+        if self._queues.end_dead(at_ns, disruption.alive):
+            self._decide(ALREADY_DUE_NS, liveness)
         self._queues.switch(at_ns, disruption)
-        return decided
 
-    def drain(self) -> Transmissions:
-        """Remove all queued packets."""
-        return self._queues.pop_due(NEVER_NS, self._disruption)
+    def drain(self) -> Table:
+        """Return all queued packets; they leave the table with the last links."""
+        queued = self.queued
+        self._packets.rows["step"] = DECIDED
+        return queued
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """Return the edges of the radio graph: robot rows a < b, sorted, (e, 2)."""
-        return self._channel.edges(pose, alive, self._now_ns)
+        pairs = pairs_in_range(self._in_range(pose), alive)
+        losses, delivery = self._losses, self._losses.passing
+        stages = [stage for stage in self._with_delivery if not stage.passes_all]
+        if stages or losses.varies:
+            a, b = np.ascontiguousarray(pairs.T)
+            delivery = delivery * np.minimum(losses.delivery(a, b, self._now_ns), losses.delivery(b, a, self._now_ns))
+            for stage in stages:
+                delivery = delivery * stage.delivery(a, b, pose)
+        return edges_above(pairs, delivery, self._radio.min_delivery)
 
-    def _decide(self, packets: Transmissions, liveness: LivenessHistory) -> Decided:
-        if not len(packets):
-            return packets, self._no_links
-        return packets, self._channel.decide(packets, self._pose, liveness)
+    def _decide(self, until_ns: int, liveness: LivenessHistory) -> None:
+        pose, packets, links, disruption = self._pose, self._packets, self._links, self._context.disruption
+        neighbours, sight, bodies = self._in_range(pose), self._sight, self._bodies
+        before = StagesBefore(
+            sight and sight.params(pose),
+            bodies and bodies.params(pose),
+            self._losses.losses(NO_TRACE_NS, self._now_ns, len(neighbours.other)),
+        )
+        order = NO_ORDER
+        if self._losses.has_state:  # frames of a link are tested in the order of time
+            order = np.argsort(packets.rows["off_air_at_ns"], kind="stable")
+        for _ in range(2):
+            waiting = decide(
+                *(until_ns, order, packets.table, packets.used, links.table, links.used, neighbours, pose),
+                *(self._context.keys, liveness.alive, liveness.first_epoch, disruption.cuts, before, self._after),
+            )
+            if waiting >= 0:
+                break
+            links.reserve(-waiting)
+        self._waiting = waiting
+
+    def _in_range(self, pose: FloatArray) -> Neighbours:
+        """Return the robots in range of each other, cached for the packets and the radio graph of a tick."""
+        if pose is not self._neighbours_pose:
+            assert self._radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
+            running, wrap_m = self._context.running, self._context.wrap_m
+            self._neighbours = find_neighbours(self._grid, pose, running, wrap_m, self._radio.range_m)
+            self._neighbours_pose = pose
+        return self._neighbours
+
+
+def _grid_of(context: ChannelContext) -> Grid:
+    """Return the grid in which the robots in range of a robot are in its cell or in adjacent ones."""
+    assert context.radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
+    arenas, clamps = len(context.keys), not context.is_torus
+    return grid_over(context.size_m, context.radio.range_m, arenas, arenas * context.robots, clamps)

@@ -12,11 +12,6 @@ from swarmwire.comms.base.geometry import robot_index
 from swarmwire.comms.base.geometry.obstacles import to_nearest
 from swarmwire.comms.base.geometry.robot_index import Grid
 from swarmwire.comms.base.kernels import kernel, njit
-from swarmwire.comms.base.sentinels import BROADCAST
-from swarmwire.comms.radio.transmissions import FATE, SENDER, TO
-from swarmwire.comms.robot.packets import Fate
-
-TOO_LARGE = int(Fate.TOO_LARGE)
 
 
 class Neighbours(NamedTuple):
@@ -41,28 +36,6 @@ def find_neighbours(
         range_m: of the radio.
     """
     return Neighbours(*_within(grid, pose.reshape(len(running), -1, pose.shape[1]), running, wrap_m, range_m))
-
-
-@njit()
-def links_in_range(first: IntArray, other: IntArray, robots: int, packets: IntArray) -> tuple[IntArray, IntArray]:
-    """Return a packet row and a robot row for each robot in range of a packet's sender, packet by packet.
-
-    `first` and `other` are columns of `Neighbours`, `packets` is a table of transmissions. Packets that are TOO_LARGE
-    have no links.
-    """
-    sender, to, fate = packets[SENDER], packets[TO], packets[FATE]
-    capacity = 0
-    for s in sender:
-        capacity += first[s + 1] - first[s]
-    packet, receiver = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
-    count = 0
-    for p in range(len(sender)):
-        s = sender[p]
-        for k in range(first[s], first[s + 1]):
-            packet[count], receiver[count] = p, other[k]
-            is_addressed = to[p] == BROADCAST or other[k] == s - s % robots + to[p]
-            count += is_addressed and fate[p] != TOO_LARGE
-    return packet[:count], receiver[:count]
 
 
 @njit()

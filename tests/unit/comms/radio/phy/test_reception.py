@@ -13,7 +13,6 @@ from swarmwire.comms.radio.config.impairments import Measures, RangeMeasure
 from swarmwire.comms.radio.config.phy import Access, Antenna, Fading, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption, Jammers
-from swarmwire.comms.radio.model import Decided
 from swarmwire.comms.radio.phy import model
 from swarmwire.comms.radio.phy.model import Reporter
 from swarmwire.comms.radio.phy.results import ResultBuffer
@@ -300,13 +299,13 @@ def finished(result: Run) -> list[tuple[int, ...]]:
 
 
 def test_fates_are_independent_of_the_result_buffer_capacity(monkeypatch: pytest.MonkeyPatch):
-    at_once, goes, decided = finished(crowded()), set[int](), Reporter.decided
+    at_once, goes, report = finished(crowded()), set[int](), Reporter.report
 
-    def counted(self: Reporter, parts: list[ResultBuffer], *more: Any) -> Decided:
+    def counted(self: Reporter, parts: list[ResultBuffer], *more: Any) -> None:
         goes.add(len(parts))
-        return decided(self, parts, *more)
+        report(self, parts, *more)
 
-    monkeypatch.setattr(Reporter, "decided", counted)
+    monkeypatch.setattr(Reporter, "report", counted)
     for room in (1, 200, 300, 400):
         monkeypatch.setattr(model, "MIN_CAPACITY", room)
         assert finished(crowded()) == at_once

@@ -8,9 +8,10 @@ import pytest
 from swarmwire.comms.base.sentinels import NOWHERE, UNDER_WAY
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.counters import PacketCounters
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
-from swarmwire.comms.radio.transmissions import COLUMNS, FATE, ON_AIR_AT, SENDER, SENT_AT, Admission
-from swarmwire.comms.radio.unit_disk.tx_queue import enqueue
+from swarmwire.comms.radio.transmissions import PACKET, Transmissions
+from swarmwire.comms.radio.unit_disk.tx_queue import QueueState, TxQueues, enqueue
 from swarmwire.comms.robot.packets import Fate, SentPackets
 from tests.support.comms.radio import Run, at, make_medium, packets, run, run_disrupted, with_access
 
@@ -138,27 +139,31 @@ def test_backlog_is_released_by_each_radio_separately():
 
 
 def test_packets_are_admitted_by_sender_in_any_order_of_arrival():
-    intake = Admission(4)
+    table, accounts = Transmissions(), PacketCounters(1, 4)
+    queues = TxQueues(SLOWEST, 4, table)
     for before in (0, 2):
-        taken = intake.admit(np.zeros(4, np.int64), packets([3, 1, 3, 1], to=[0, 1, 2, 3]), np.full(4, 3), 7)
-        assert taken.sender.tolist() == [1, 1, 3, 3]
-        assert taken.to.tolist() == [1, 3, 0, 2]
-        assert (taken.sequence - before).tolist() == [0, 1, 0, 1]
-        assert [taken.payloads.row(k)[0] for k in range(4)] == [1, 3, 0, 2]
-        assert (taken.intended.tolist(), taken.epoch.tolist()) == ([1] * 4, [7] * 4)
+        sent = packets([3, 1, 3, 1], to=[0, 2, 2, 3])
+        queues.accept(np.zeros(4, np.int64), sent, np.full(4, 3), 7, accounts.counts)
+        admitted = table.rows[-4:]
+        assert admitted["sender"].tolist() == [1, 1, 3, 3]
+        assert admitted["to"].tolist() == [2, 3, 0, 2]
+        assert (admitted["sequence"] - before).tolist() == [0, 1, 0, 1]
+        assert table.data[admitted["first_byte"]].tolist() == [1, 3, 0, 2]
+        assert (admitted["intended"].tolist(), admitted["epoch"].tolist()) == ([1] * 4, [7] * 4)
+    assert (accounts.counts["sent"].tolist(), accounts.counts["intended"].tolist()) == ([8], [8])
 
 
 def test_packets_to_nobody_are_admitted_without_receivers():
-    sent = packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE])
-    admitted = Admission(2).admit(np.zeros(3, np.int64), sent, np.ones(2, np.int64), 0)
-    assert (admitted.sender.tolist(), admitted.sequence.tolist()) == ([0, 0, 1], [0, 1, 0])
-    assert (admitted.to.tolist(), admitted.intended.tolist()) == ([NOWHERE, 1, NOWHERE], [0, 1, 0])
+    table, sent = Transmissions(), packets([0, 0, 1], to=[NOWHERE, 1, NOWHERE])
+    queues = TxQueues(SLOWEST, 2, table)
+    queues.accept(np.zeros(3, np.int64), sent, np.ones(2, np.int64), 0, PacketCounters(1, 2).counts)
+    assert (table.rows["sender"].tolist(), table.rows["sequence"].tolist()) == ([0, 0, 1], [0, 1, 0])
+    assert (table.rows["to"].tolist(), table.rows["intended"].tolist()) == ([NOWHERE, 1, NOWHERE], [0, 1, 0])
 
 
 AIRTIME_NS = 1_000_000
 SENDERS, WARM_UP, PACKETS = 1500, 150, 400
 STANDARD_ERRORS = 4.4
-NOBODY = np.empty((COLUMNS, 0), np.int64)
 
 
 @pytest.mark.parametrize(("load", "stated"), [(0.5, 0.5), (0.8, 2.0), (0.9, 4.5)])
@@ -169,16 +174,15 @@ def test_queue_wait_at_random_arrivals_matches_theory(load: float, stated: float
     """
     gaps_ns = np.random.default_rng(7).exponential(AIRTIME_NS / load, (WARM_UP + PACKETS, SENDERS))
     sent_at_ns = np.cumsum(gaps_ns, axis=0).astype(np.int64)
-    free_at_ns, wait = np.zeros(SENDERS, np.int64), np.zeros(SENDERS)
-    sizes, limit = np.zeros(SENDERS + 1, np.int64), np.full(SENDERS, 10**9)
-    packets = np.zeros((COLUMNS, SENDERS), np.int64)
-    packets[SENDER] = np.arange(SENDERS)
+    wait, table, used = np.zeros(SENDERS), np.zeros(SENDERS, PACKET), np.array([SENDERS, 0])
+    queue = QueueState(np.zeros(SENDERS, np.int64), np.full(SENDERS, 10**9), np.full(SENDERS, DROP))
+    table["sender"] = np.arange(SENDERS)
     for k, at_ns in enumerate(sent_at_ns):
-        packets[FATE], packets[SENT_AT] = UNDER_WAY, at_ns
-        enqueue(free_at_ns, NOBODY, packets, sizes, 0, np.array([AIRTIME_NS]), limit)
-        assert (packets[FATE] == UNDER_WAY).all()
+        table["fate"], table["sent_at_ns"] = UNDER_WAY, at_ns
+        enqueue(table, used, 0, queue, 0, np.array([AIRTIME_NS]))
+        assert (table["fate"] == UNDER_WAY).all()
         if k >= WARM_UP:
-            wait += (packets[ON_AIR_AT] - at_ns) / AIRTIME_NS / PACKETS
+            wait += (table["on_air_at_ns"] - at_ns) / AIRTIME_NS / PACKETS
     assert load / (2.0 * (1.0 - load)) == pytest.approx(stated, rel=1e-12)
     assert abs(wait.mean() - stated) < STANDARD_ERRORS * wait.std() / np.sqrt(SENDERS)
 
