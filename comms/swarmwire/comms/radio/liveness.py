@@ -55,6 +55,7 @@ class Liveness:
         pending: the latest disruption.
         present: robots that are alive by it, in arenas that run, (rows,).
         others_alive: number of intended receivers of a broadcast by each robot, (rows,).
+        any_ended: True if an arena has ended.
     """
 
     def __init__(self, context: ChannelContext) -> None:
@@ -64,7 +65,7 @@ class Liveness:
         self.others_alive: IntArray = np.zeros(rows, np.int64)
         self._robots, self._running, self._active = context.robots, context.running, context.disruption
         self._has_ended: BoolArray = np.zeros(rows, np.bool_)  # robots of arenas that have ended
-        self._any_ended = False
+        self.any_ended = False
         # True if the pending disruption is new, or an arena has ended, since the last `apply`.
         self._is_new, self._has_outages = True, False
 
@@ -96,17 +97,13 @@ class Liveness:
         """End the run in `arenas` (arenas,)."""
         leaving = np.repeat(arenas, self._robots)
         self._has_ended |= leaving
-        self._any_ended = self._is_new = True
+        self.any_ended = self._is_new = True
         self._running &= ~arenas
         self.present = self.present & ~leaving
 
     def has_ended(self, sender: IntArray) -> BoolArray:
         """Return True for each robot row `sender` (k,) in an arena that has ended."""
         return self._has_ended[sender]
-
-    def any_ended(self, sender: IntArray) -> bool:
-        """Return True if any robot row `sender` (k,) is in an arena that has ended."""
-        return self._any_ended and bool(self._has_ended[sender].any())
 
     def in_running_arenas(self, packets: Table) -> Table:
         """Return the packets, of type PACKET, that were sent in arenas that still run."""

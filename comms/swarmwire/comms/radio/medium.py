@@ -291,11 +291,13 @@ class RadioMedium:
         """Follow the links from row `first_new` on, which are new; drop those of arenas that have ended."""
         if len(self._links) == first_new:
             return
-        self._next_ns, links = 0, self._links.rows
+        self._next_ns = 0
         if self.radio.delays is not None and self.radio.delays.keep_order:
-            keep_link_order(self._packets.rows, links, first_new, self._rows)
-        if self._liveness.any_ended(links["sender"][first_new:]):
-            self._keep_links(~self._liveness.has_ended(links["sender"]))
+            keep_link_order(self._packets.rows, self._links.rows, first_new, self._rows)
+        if self._liveness.any_ended:
+            has_ended = self._liveness.has_ended(self._links.rows["sender"])
+            if has_ended[first_new:].any():
+                self._keep_links(~has_ended)
 
     def _keep_links(self, is_kept: BoolArray) -> None:
         """Keep only the links of `is_kept` (links,) and their packets."""

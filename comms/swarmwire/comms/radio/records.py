@@ -4,19 +4,20 @@
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.tick_record import tick_record
 from swarmwire.comms.robot.packets import Payloads, offsets
 
 # `TransmissionRecords.fate` of a packet that went on air; each of its receivers has a fate of its own.
 ON_AIR = 0
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class ReceptionRecords:
     """Links whose fate became final since the last tick: a row per (packet, receiver it might have reached).
 
@@ -62,7 +63,7 @@ class ReceptionRecords:
         return replace(filled[0], **columns)
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class TransmissionRecords:
     """Packets whose transmission ended since the last tick, a row each: they came off air, or never went on air.
 
@@ -101,7 +102,7 @@ def _joined_columns(tables: Sequence[ReceptionRecords] | Sequence[TransmissionRe
     return {name: np.concatenate([getattr(table, name) for table in tables]) for name in _columns(tables[0])}
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class PacketCounts:
     """Packets counted since the last tick, a row per arena; over a run the fates add up to the intended receivers."""
 

@@ -6,7 +6,7 @@ times as long.
 
 # pyright: basic, reportUnknownMemberType=false
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import reduce
 from operator import add
 
@@ -16,6 +16,7 @@ from swarmwire.comms.base.arrays import AnyArray, BoolArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import ABSENT, NO_ROBOT, UNDER_WAY
+from swarmwire.comms.base.tick_record import tick_record
 from swarmwire.comms.radio.links import OUT_OF_RANGE, RECEIVED, Links, keep_links
 from swarmwire.comms.radio.records import ON_AIR, PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.radio.transmissions import Transmissions
@@ -91,7 +92,7 @@ def _precedes(row, other, receiver, at_ns, sender):
     return at_ns[row] < at_ns[other] or sender[row] < sender[other]
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class Results:
     """Receptions, fates and transmit statuses that became final in a stretch of time, and the radio graph."""
 
@@ -156,7 +157,7 @@ def final_by(
     """
     received, finished, rssi_dbm, data, offset, departed = _final(
         *(until_ns, packets.table, packets.data, packets.used, links.table, links.used, robots, counts),
-        len(measures) > 0,
+        *(len(measures) > 0, has_power),
     )
     payloads, rssi = Payloads(data, offset), rssi_dbm if has_power else None
     return (
@@ -194,7 +195,7 @@ def _received_between(since_ns, until_ns, packets, data, used, links, link_used,
 
 
 @njit(nogil=True)
-def _final(until_ns, packets, data, used, links, link_used, robots, counts, has_measures):
+def _final(until_ns, packets, data, used, links, link_used, robots, counts, has_measures, has_power):
     """Return the tables of `final_by`: each row of a table is a column of a result, in their order.
 
     A link may have several kinds of results: received; finished, without receivers out of range; and departed, one for
@@ -227,7 +228,7 @@ def _final(until_ns, packets, data, used, links, link_used, robots, counts, has_
     offset[used[0]] = used[1]
     results = (
         _received(received[:h], packets, data, used, links, robots, has_measures),
-        *_finished(finished[:f], packets, links, arena, robots),
+        *_finished(finished[:f], packets, links, arena, robots, has_power),
         data[: used[1]].copy(),
         offset,
         _departed(departed[:d], packets, links, arena, robots),
@@ -283,9 +284,9 @@ def _received(rows, packets, data, used, links, robots, has_measures):
 
 
 @njit()
-def _finished(rows, packets, links, arena, robots):
+def _finished(rows, packets, links, arena, robots, has_power):
     """Return the integer columns of `ReceptionRecords`, then the rows of payloads, (13, k); and the power, (k,)."""
-    columns, rssi_dbm = np.empty((13, len(rows)), np.int64), np.empty(len(rows))
+    columns = np.empty((13, len(rows)), np.int64)
     for k in range(np.uint64(len(rows))):
         link = links[rows[k]]
         p = np.uint64(link.packet)
@@ -295,7 +296,10 @@ def _finished(rows, packets, links, arena, robots):
         columns[3, k], columns[4, k], columns[5, k] = link.receiver_count, packet.to, packet.sequence
         columns[6, k], columns[7, k], columns[8, k] = packet.sent_at_ns, packet.on_air_at_ns, link.final_at_ns
         columns[9, k], columns[10, k] = link.fate, packet.size_bytes
-        columns[11, k], columns[12, k], rssi_dbm[k] = packet.tag, p, link.rssi_dbm
+        columns[11, k], columns[12, k] = packet.tag, p
+    rssi_dbm = np.empty(len(rows) if has_power else 0)
+    for k in range(np.uint64(len(rssi_dbm))):
+        rssi_dbm[k] = links[rows[k]].rssi_dbm
     return columns, rssi_dbm
 
 

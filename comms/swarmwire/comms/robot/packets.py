@@ -5,7 +5,7 @@ exactly one `Fate`. The sender of a unicast packet may also get a `TxStatuses` r
 is less than the fate.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import BoolArray, ByteArray, FloatArray, IntArray
 from swarmwire.comms.base.config import ExplainedEnum
 from swarmwire.comms.base.sentinels import NO_TAG, NO_TX_STATUS
+from swarmwire.comms.base.tick_record import tick_record
 
 TAG_BYTES = 2  # the tag at the start of a payload identifies the class of its message
 
@@ -46,7 +47,7 @@ class Fate(ExplainedEnum):
 FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # names in summaries and tables, by value
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class Payloads:
     """A table of encoded messages: row p is data[offset[p]:offset[p + 1]] and starts with the message's tag."""
 
@@ -124,7 +125,7 @@ _NOTHING = np.empty(0, np.int64)
 _NO_PAYLOADS = Payloads.from_rows([])
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class SentPackets:
     """Packets that agents sent in one tick; the packets of one sender stand in the order of its `send` calls."""
 
@@ -171,7 +172,7 @@ class SentPackets:
 _NO_PACKETS = SentPackets(_NOTHING, _NOTHING, _NO_PAYLOADS)
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class ReceivedPackets:
     """Packets that reached robots since the last tick, sorted by (receiver, received_at_ns, sender_index, sequence)."""
 
@@ -242,7 +243,7 @@ class TxResult(ExplainedEnum):
     TOO_LARGE = 4, "above the medium's largest payload: never on air"
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class TxStatuses:
     """Unicast packets whose transmission ended at the sender's radio, sorted by (row, id)."""
 

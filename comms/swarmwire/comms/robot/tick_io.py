@@ -5,18 +5,19 @@ commands, noted values and motor switches. Notes and values are for observers an
 are `SparseTable`s, with rows only for robots that set a number in the tick.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.tick_record import tick_record
 from swarmwire.comms.robot.packets import SentPackets
 
 MAX_STATE = 64  # characters in the name of a state
 MAX_STATES = 256  # different states in a run, and in one tick of a runner
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class SparseTable:
     """Numbers that robots set in one tick; of several rows with the same robot and slot, the last one applies.
 
@@ -72,7 +73,7 @@ def checked_state(state: object) -> str:
     return state
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class GroupReadings:
     """The sensor readings of the robots of one group, a row per robot.
 
@@ -88,7 +89,7 @@ class GroupReadings:
 Readings = dict[str, GroupReadings]  # name of the group: readings of its robots
 
 
-@dataclass(frozen=True, slots=True)
+@tick_record
 class Actions:
     """The actions of the robots whose agents stepped in one tick, a row per robot."""
 

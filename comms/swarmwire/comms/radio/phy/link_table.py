@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray, SignedByteArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray, SignedByteArray, Table
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams
-from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkRanges, Table
+from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkRanges
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.stages.blocking import LineOfSight, end_disrupted
 from swarmwire.comms.robot.packets import Fate

@@ -60,7 +60,7 @@ class LineOfSight(Stage):
 
     def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray) -> FloatArray:
         """Return 0 for blocked links, else 1."""
-        return 1.0 - self.blocked(pose, sender, receiver)
+        return (~self.blocked(pose, sender, receiver)).astype(np.float64)
 
     def blocked(self, pose: FloatArray, a: IntArray, b: IntArray) -> BoolArray:
         """Return True where an obstacle blocks the line between robot rows, (k,)."""

@@ -15,10 +15,10 @@ class ReceivedFrame(NamedTuple):
     """
 
     key: int  # key of the arena
-    sender: int  # robot row
+    sender: int | np.int64  # robot row
     receiver: int | np.int64  # robot row
-    s: int  # index of the sender in the arena
-    r: int  # index of the receiver in the arena
+    s: int | np.int64  # index of the sender in the arena
+    r: int | np.int64  # index of the receiver in the arena
     sequence: int  # sequence number of the packet, or of the acknowledged packet
     attempt: int  # number of the attempt, from 0; a unit disk has only one
     is_ack: bool

@@ -153,7 +153,7 @@ class UnitDisk(RadioModel):
         self._radio, self._grid = context.radio, _grid_of(context)
         self._sight, self._bodies = LineOfSight.create(context), BodiesBlock.create(context)
         self._with_delivery = [stage for stage in (self._sight, self._bodies, Disrupted(context)) if stage is not None]
-        self._after = stages_after(context)
+        self._after, self._varies = stages_after(context), self._losses.varies
         self._neighbours_pose: FloatArray | None = None  # poses of the cached `_neighbours`
 
     @property
@@ -203,7 +203,7 @@ class UnitDisk(RadioModel):
         pairs = pairs_in_range(self._in_range(pose), alive)
         losses, delivery = self._losses, self._losses.passing
         stages = [stage for stage in self._with_delivery if not stage.passes_all]
-        if stages or losses.varies:
+        if stages or self._varies:
             a, b = np.ascontiguousarray(pairs.T)
             delivery = delivery * np.minimum(losses.delivery(a, b, self._now_ns), losses.delivery(b, a, self._now_ns))
             for stage in stages:

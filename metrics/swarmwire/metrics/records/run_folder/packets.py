@@ -1,7 +1,7 @@
 """The table `packets`: the fate of each packet, or of a share of them, at each receiver within reach."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -179,9 +179,8 @@ class PacketColumns:
     def frame(self) -> pl.DataFrame:
         """Return the rows of the sampled packets, in the order of their final times."""
         keep = [self.sample(part) & (part.to != NOWHERE) for part in self.parts]
-        numbers = {
-            name: self._joined(name, keep) for name in ReceptionRecords.__slots__ if name not in OPTIONAL_COLUMNS
-        }
+        names = [column.name for column in fields(ReceptionRecords) if column.name not in OPTIONAL_COLUMNS]
+        numbers = {name: self._joined(name, keep) for name in names}
         fate, tag = numbers.pop("fate"), numbers.pop("tag")
         has_receiver, is_addressed = pl.Series(numbers["receiver"] != NO_ROBOT), pl.Series(numbers["to"] != BROADCAST)
         columns: dict[str, Any] = {
