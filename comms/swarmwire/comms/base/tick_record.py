@@ -12,5 +12,5 @@ T = TypeVar("T")
 
 @dataclass_transform(frozen_default=True)
 def tick_record(cls: type[T]) -> type[T]:
-    """Return the class as a dataclass with slots that nobody may change, though only the type checker sees to it."""
+    """Return the class as a dataclass with slots; that its fields are not changed, only the type checker sees to."""
     return dataclass(slots=True, unsafe_hash=True)(cls)  # equal and hashed as a frozen one

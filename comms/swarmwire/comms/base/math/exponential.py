@@ -125,6 +125,11 @@ def define_exponential(operations: Operations) -> Exponential:  # noqa: PLR0915 
         return rounded - ROUND, bits(rounded) - ROUND_BITS
 
     @formula
+    def exp_series(t: Number) -> Number:
+        w = t * t
+        return t * ((EXP[0] + t * EXP[1]) + w * ((EXP[2] + t * EXP[3]) + w * EXP[4]))
+
+    @formula
     def exp(x: Number) -> Number:
         is_inside = (x <= MAX_EXP) & (x >= MIN_EXP)
         inside = where(is_inside, x, 0.0)
@@ -132,7 +137,7 @@ def define_exponential(operations: Operations) -> Exponential:  # noqa: PLR0915 
         high, low = inside - k * LN2_HIGH, k * LN2_LOW
         r = high - low
         t = r * r
-        c = r - t * (EXP[0] + t * (EXP[1] + t * (EXP[2] + t * (EXP[3] + t * EXP[4]))))
+        c = r - exp_series(t)
         y = scale(1.0 - ((low - (r * c) / (2.0 - c)) - high), n)
         return where(is_inside, y, where(x > 0.0, INF, where(x < 0.0, 0.0, NAN)))
 
@@ -177,7 +182,9 @@ def define_exponential(operations: Operations) -> Exponential:  # noqa: PLR0915 
         """Return k ln 2 + log(1 + f) + correction, f from sqrt(1/2) - 1 to sqrt(2) - 1."""
         s = f / (2.0 + f)
         z = s * s
-        series = z * (LOG[0] + z * (LOG[1] + z * (LOG[2] + z * (LOG[3] + z * (LOG[4] + z * (LOG[5] + z * LOG[6]))))))
+        w = z * z
+        odd = w * (LOG[1] + w * (LOG[3] + w * LOG[5]))
+        series = odd + z * (LOG[0] + w * (LOG[2] + w * (LOG[4] + w * LOG[6])))
         half = 0.5 * f * f
         return k * LN2_HIGH - ((half - (s * (half + series) + (k * LN2_LOW + correction))) - f)
 
@@ -206,9 +213,7 @@ def define_exponential(operations: Operations) -> Exponential:  # noqa: PLR0915 
     @formula
     def log10(x: Number) -> Number:
         k, mantissa = log_split(where((x > 0.0) & (x < INF), x, 1.0))
-        k_down = where(k < 0.0, k + 1.0, k)  # the mantissa from 1/2 to 1 below 1, so that the sum does not cancel
-        mantissa = where(k < 0.0, 0.5 * mantissa, mantissa)
-        y = (k_down * LOG10_2_LOW + INVERSE_LN10 * log(mantissa)) + k_down * LOG10_2_HIGH
+        y = (k * LOG10_2_LOW + INVERSE_LN10 * log_of_parts(0.0, mantissa - 1.0, 0.0)) + k * LOG10_2_HIGH
         return with_edges(x, y, 0.0)
 
     @formula
@@ -260,7 +265,7 @@ def define_exponential(operations: Operations) -> Exponential:  # noqa: PLR0915 
         z = u + v
         w = v - (z - u)
         t = z * z
-        c = z - t * (EXP[0] + t * (EXP[1] + t * (EXP[2] + t * (EXP[3] + t * EXP[4]))))
+        c = z - exp_series(t)
         r = (z * c) / (c - 2.0) - (w + z * w)
         return scale(1.0 - (r - z), n)
 

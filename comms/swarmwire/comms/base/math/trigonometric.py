@@ -89,13 +89,14 @@ def define_trigonometric(operations: Operations) -> Trigonometric:  # noqa: PLR0
     @formula
     def sin_cos_of_remainder(r: Number, low: Number, quotient: Integer) -> Any:
         z = r * r
-        series = SIN[1] + z * (SIN[2] + z * (SIN[3] + z * (SIN[4] + z * SIN[5])))
+        w = z * z
+        series = (SIN[1] + z * (SIN[2] + z * SIN[3])) + z * w * (SIN[4] + z * SIN[5])
         cube = z * r
         s = r - ((z * (0.5 * low - cube * series) - low) - cube * SIN[0])
         half = 0.5 * z
-        w = 1.0 - half
-        series = z * (COS[0] + z * (COS[1] + z * (COS[2] + z * (COS[3] + z * (COS[4] + z * COS[5])))))
-        c = w + (((1.0 - w) - half) + (z * series - r * low))
+        near = 1.0 - half
+        series = z * (COS[0] + z * (COS[1] + z * COS[2])) + w * w * (COS[3] + z * (COS[4] + z * COS[5]))
+        c = near + (((1.0 - near) - half) + (z * series - r * low))
         is_even = (quotient & 1) == 0
         sine, cosine = where(is_even, s, c), where(is_even, c, s)
         return (

@@ -96,7 +96,8 @@ def fate_of_frame(params, losses, state, s, i, frame_log_success):
     else:
         sequence, attempt, draw_purpose = state.packet[sender.packet].sequence, sender.attempt, RECEPTION
     u = uniform(key, a, b, sequence, draw_purpose + attempt)
-    if u >= math_compiled.exp(frame_log_success):
+    # exp(x) is at least 1 + x: most frames need no exponential.
+    if u >= 1.0 + frame_log_success and u >= math_compiled.exp(frame_log_success):
         if u < math_compiled.exp(frame_log_success + state.reception[receiver].jam_log):
             return JAMMED
         alone = math_compiled.exp(alone_log_success(params, state.link[i].power_mw, sender.bits, is_ack))
