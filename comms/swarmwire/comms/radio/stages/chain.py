@@ -17,9 +17,9 @@ To add a loss, a delay or a measurement:
    `Stage` with the FIELDS of its parameters, and a kernel that returns the delay or the value (`delays.py`). Docstrings
    state formulas, sources and units. Draws are keyed by the arena's key, (sender, receiver, sequence) as indices in the
    arena (`link_draws.py`), and a purpose of its own, so that no stage shifts the draws of another. A new drop reason is
-   a new `Fate`, with its colour in `FATE_COLORS` (`metrics/drawing/canvas.py`) and, if every receiver has it on a link
-   of its own, an entry in `LINK_FATES` (`metrics/run_folder/radio_totals.py`). A new measurement is a field of LINK
-   (`links.py`), listed in `Measures.columns`.
+   a new `Fate`, with its colour in `FATE_COLORS` (`metrics/pictures/drawing/canvas.py`) and, if every receiver has it
+   on a link of its own, an entry in `LINK_FATES` (`metrics/records/run_folder/radio_totals.py`). A new measurement is a
+   field of LINK (`links.py`), listed in `Measures.columns`.
 3. List the class, and call the kernel: a loss in `LOSS_MODELS`, `Losses` and `loss_fate` (`losses.py`); another stage
    in `AFTER_RECEPTION` and `after_reception` below, in its position.
 
