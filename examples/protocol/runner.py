@@ -85,10 +85,8 @@ def acted(arrays: dict[str, Any], assignment: dict[str, Any]) -> dict[str, Any]:
         prefix = f"readings/{group['name']}"
         if f"{prefix}/rows" in arrays:  # else the group does not act in this tick
             angles = [math.radians(angle) for angle in group["body"]["sensors"]["proximity"]["angles_deg"]]
-            headings, values = (
-                unpacked(arrays[f"{prefix}/compass.heading_rad"]),
-                unpacked(arrays[f"{prefix}/proximity.value"]),
-            )
+            headings = unpacked(arrays[f"{prefix}/compass.heading_rad"])
+            values = unpacked(arrays[f"{prefix}/proximity.value"])
             for at, row in enumerate(unpacked(arrays[f"{prefix}/rows"])):
                 rays = values[at * len(angles) : (at + 1) * len(angles)]
                 commands.append([1.0, *steer(headings[at], angles, rays, received.get(row, ())), 0.0])
@@ -106,16 +104,13 @@ def acted(arrays: dict[str, Any], assignment: dict[str, Any]) -> dict[str, Any]:
 
 def opened(arguments: argparse.Namespace) -> zenoh.Session:
     """A client of the endpoint, and of nobody else."""
-    off, certificate = (
-        {"enabled": False},
-        {"connect_certificate": arguments.certificate, "connect_private_key": arguments.key},
-    )
+    off = {"enabled": False}
+    certificate = {"connect_certificate": arguments.certificate, "connect_private_key": arguments.key}
     config: dict[str, Any] = {"mode": "client", "connect": {"endpoints": [arguments.endpoint], "timeout_ms": 10000}}
     config["scouting"] = {"multicast": off, "gossip": off}
     if arguments.ca:
-        config["transport"] = {
-            "link": {"tls": {"root_ca_certificate": arguments.ca, "enable_mtls": True, **certificate}}
-        }
+        tls = {"root_ca_certificate": arguments.ca, "enable_mtls": True, **certificate}
+        config["transport"] = {"link": {"tls": tls}}
     return zenoh.open(zenoh.Config.from_json5(json.dumps(config)))
 
 

@@ -120,11 +120,9 @@ def test_reported_agent_failure_ends_the_run_with_its_traceback() -> None:
         Played(lambda _: [lies]).run()
 
 
-def test_pranks_are_listed_in_the_docs_with_their_counts() -> None:
-    listed = {
-        prank_name.strip(): set(re.findall(r"`(\w+)`", counted)) for prank_name, counted in ROW.findall(section())
-    }
-    assert listed == {prank.what: {*prank.counts, *prank.fates} for prank in (EARLY, *BESIDE, *INSTEAD)}
+def test_pranks_have_their_counts_listed_in_the_docs() -> None:
+    listed = {count for _, counted in ROW.findall(section()) for count in re.findall(r"`(\w+)`", counted)}
+    assert listed == {count for prank in (EARLY, *BESIDE, *INSTEAD) for count in (*prank.counts, *prank.fates)}
 
 
 def section() -> str:
