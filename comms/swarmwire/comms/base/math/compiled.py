@@ -94,6 +94,23 @@ def _angle_loop(near_function: Any, function: Any) -> Any:
     return loop
 
 
+@_formula
+def _weighted_sum(rows: Any, weights: Any, out: Any):
+    """Sum rows (k, n) times weights (k,) in eight lanes, of every eighth row each; at least eight rows."""
+    lanes = np.empty((8, rows.shape[1]))
+    for k in range(len(rows)):
+        lane, row, weight = lanes[k % 8], rows[k], weights[k]
+        if k < 8:
+            for i in range(len(row)):
+                lane[i] = row[i] * weight
+        else:
+            for i in range(len(row)):
+                lane[i] = lane[i] + row[i] * weight
+    a, b, c, d, e, f, g, h = lanes[0], lanes[1], lanes[2], lanes[3], lanes[4], lanes[5], lanes[6], lanes[7]
+    for i in range(len(out)):
+        out[i] = 0.0 + (((a[i] + b[i]) + (c[i] + d[i])) + ((e[i] + f[i]) + (g[i] + h[i])))
+
+
 def _binary_loop(function: Any) -> Any:
     @_formula
     def loop(x: Any, y: Any, out: Any):
@@ -107,4 +124,5 @@ COMPILED.update({name: _unary_loop(globals()[name]) for name in UNARY})
 COMPILED.update({name: _binary_loop(globals()[name]) for name in BINARY})
 # By itself LLVM does not inline so long a function, and an array then takes ten times as long.
 COMPILED["atan2"] = _binary_loop(njit(error_model="numpy", forceinline=True)(getattr(atan2, "py_func", atan2)))
+COMPILED["weighted_sum"] = _weighted_sum
 COMPILED["sin"], COMPILED["cos"] = _angle_loop(_near_sin, sin), _angle_loop(_near_cos, cos)

@@ -115,6 +115,10 @@ def ordered_weighted_sum(rows: FloatArray, weights: FloatArray) -> FloatArray:
         for row, weight in zip(rows, weights, strict=True):
             total = total + row * weight
         return total
+    if (compiled := portable.COMPILED.get("weighted_sum")) and rows.ndim == 2 and weights.shape[1] == 1:
+        out = np.empty(rows.shape[1])
+        compiled(np.ascontiguousarray(rows), np.ascontiguousarray(weights[:, 0]), out)
+        return out
     lanes = rows[:LANES] * weights[:LANES]
     for first in range(LANES, len(rows), LANES):
         terms = rows[first : first + LANES] * weights[first : first + LANES]
