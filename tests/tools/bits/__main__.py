@@ -12,7 +12,7 @@ from swarmwire.deploy import run
 
 ROOT = Path(__file__).parents[3]
 HASHES = Path(__file__).with_name("hashes.txt")
-FOLDERS = ("scenarios", "scenarios/behaviours", "scenarios/robots", "examples/beacons", "examples/ways")
+FOLDERS = ("scenarios", "scenarios/behaviours", "scenarios/robots", "examples/beacons", "examples/gas", "examples/ways")
 SECONDS = 3.0
 DIGITS = 32  # of the hash, half of them
 PER_MACHINE_TYPE = "pymunk"  # an engine in C, whose compiler may contract what it computes
@@ -41,21 +41,27 @@ def main(arguments: list[str]) -> int:
     """Run the scenarios; return 1 if a line differs from the committed one."""
     os.chdir(ROOT)
     writes = "--write" in arguments
-    names = [name for name in arguments if name != "--write"] or scenarios()
+    selected = [name for name in arguments if name != "--write"]
+    names = selected or scenarios()
     committed = {line.split(" ")[0]: line for line in HASHES.read_text(encoding="utf-8").splitlines()}
     different = 0
-    lines = dict[str, str]()
+    lines = {name: line for name, line in committed.items() if selected and name not in selected}
+    compared = 0
     for name in names:
         if (line := line_of(name)) is not None:
             lines[name] = line
             is_same = line == committed.get(name)
             different += not is_same
+            compared += 1
             print("same " if is_same else "OTHER", line, flush=True)
     if writes:
         HASHES.write_text("".join(f"{line}\n" for line in lines.values()), encoding="utf-8")
         return 0
-    print(f"{len(lines) - different} of {len(lines)} equal", flush=True)
-    return int(different > 0)
+    missing = committed.keys() - lines.keys()
+    for name in sorted(missing):
+        print("GONE ", name, flush=True)
+    print(f"{compared - different} of {compared} equal", flush=True)
+    return int(different > 0 or len(missing) > 0 or compared == 0)
 
 
 if __name__ == "__main__":

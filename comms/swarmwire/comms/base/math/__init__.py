@@ -85,7 +85,7 @@ ARRAYS = _define(Operations(np.where, _array_bits, _array_from_bits, np.sqrt, _r
 UNARY = ("sin", "cos", "tan", "atan", "asin", "exp", "expm1", "log", "log1p", "log10", "log2", "erfc")
 BINARY = ("atan2", "power", "hypot")
 FEW = 16  # numbers, up to which Python's floats are faster than some dozens of calls of numpy
-# Loops for one-dimensional arrays, the last one for the results, by function: `compiled` adds them.
+# Loops over arrays, the last one for the results, by function: `compiled` adds them, where there is a compiler.
 COMPILED: dict[str, Callable[..., None]] = {}
 
 

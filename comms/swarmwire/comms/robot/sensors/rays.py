@@ -73,22 +73,22 @@ class RadialReading(Generic[N, S]):
         if value.ndim == 1:  # called once per robot and tick: plain floats are faster than arrays of a few numbers
             values = cast("list[float]", value.tolist())
             cosines, sines = self.spec.direction_lists
-            x = ordered_sum([length * cosine for length, cosine in zip(values, cosines, strict=True)])
-            y = ordered_sum([length * sine for length, sine in zip(values, sines, strict=True)])
+            x = lane_sum([length * cosine for length, cosine in zip(values, cosines, strict=True)])
+            y = lane_sum([length * sine for length, sine in zip(values, sines, strict=True)])
             return cast("tuple[N, N]", (x, y))
         columns, direction = np.ascontiguousarray(self.value.T), self.spec.direction
         if columns.size < SMALL:
-            x, y = ordered_weighted_sum(columns[:, None, :], direction[:, :, None])
+            x, y = weighted_lane_sum(columns[:, None, :], direction[:, :, None])
         else:
-            x, y = (ordered_weighted_sum(columns, direction[:, k, None]) for k in range(2))
+            x, y = (weighted_lane_sum(columns, direction[:, k, None]) for k in range(2))
         return cast("tuple[N, N]", (x, y))
 
 
-LANES = 8  # running sums of `ordered_sum`
+LANES = 8  # running sums of `lane_sum`
 SMALL = 4096  # values; x and y of so few are summed together in half the time, of more in twice the time
 
 
-def ordered_sum(terms: list[float]) -> float:
+def lane_sum(terms: list[float]) -> float:
     """Return the sum in an order of our own, which does not depend on numpy or Python.
 
     Up to seven terms are added from left to right. More go in turn into eight running sums, which are added in pairs.
@@ -105,8 +105,8 @@ def ordered_sum(terms: list[float]) -> float:
     return 0.0 + (((a + b) + (c + d)) + ((e + f) + (g + h)))  # 0.0: a sum of zeros is not negative
 
 
-def ordered_weighted_sum(rows: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return the sum of `rows` (k, …) times `weights` (k, …), in the order and rounding of `ordered_sum`.
+def weighted_lane_sum(rows: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the sum of `rows` (k, …) times `weights` (k, …), in the order and rounding of `lane_sum`.
 
     Eight rows at a time stay in the processor's cache, which is a third faster than the product of all.
     """
