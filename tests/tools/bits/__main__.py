@@ -27,6 +27,8 @@ def scenarios() -> list[str]:
 def line_of(scenario: str) -> str | None:
     """Run a scenario and return its line; None for an engine whose runs are equal on one type of machine alone."""
     result = run(scenario, overrides=[f"duration_s={SECONDS}"])
+    if result.ended == "interrupted":  # by a signal, also that of a time limit: no line, and no other run
+        raise KeyboardInterrupt
     if PER_MACHINE_TYPE in result.engine:
         return None
     words = [scenario]
