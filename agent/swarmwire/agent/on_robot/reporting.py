@@ -174,6 +174,7 @@ class RobotObservers:
         control.at_stop = self._on_stop
         self.steps = 0
         self.check_network: Callable[[], None] = lambda: None
+        self._publish_status()  # an operator may ask while driver and network are opened
 
     def attach(self, status: Callable[[], Mapping[str, Any]]) -> None:
         """Read the status from this function from now on."""

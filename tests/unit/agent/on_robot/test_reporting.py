@@ -96,6 +96,12 @@ def test_log_and_status_are_written_once_a_second(tmp_path):
     looking.onlookers.end("duration")
 
 
+def test_status_before_the_loop_is_starting(tmp_path):
+    clock, control, file = DatedFakeClock(), Control(lambda: None), StatusFile(tmp_path / "status.json")
+    RobotObservers(clock, 1.0, Terminal("robot-0"), file, control, {"name": "robot-0"}, None)
+    assert (control.status()["name"], control.status()["state"]) == ("robot-0", "starting")
+
+
 def test_network_check_is_called_once_a_second(tmp_path):
     looking, looks = _Set(tmp_path), list[int]()
     looking.onlookers.check_network = lambda: looks.append(looking.onlookers.steps)
