@@ -15,7 +15,7 @@ from docs.behaviours import shown as of_behaviours
 from docs.behaviours.degradation import LATENCY, LOSS, degradation_of
 from docs.behaviours.shown import PAGES as PAGES_OF_BEHAVIOURS
 from docs.behaviours.shown import SHOWN, page_of
-from docs.experiments.experiment import HERE, Experiment, Places, find_experiment
+from docs.experiments.experiment import LAYOUT, Experiment, Layout, find_experiment
 from docs.experiments.experiment import names as experiments
 from docs.experiments.making import digests, page_files
 from docs.field_checks import field_comments
@@ -77,11 +77,11 @@ def code_blocks() -> Problems:
 
 def behaviour_pages() -> Problems:
     """Each behaviour has a section with its pictures, a scenario, a campaign and data of the whole campaign."""
-    places = of_behaviours.HERE
+    layout = of_behaviours.LAYOUT
     classes = {re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower(): name for name in behaviours.__all__}
     described = [name for names in PAGES_OF_BEHAVIOURS.values() for name in names]
-    data = [file.stem for file in places.data.iterdir()]
-    if any(sorted(names) != sorted(classes) for names in (described, data, of_behaviours.names(places), SHOWN)):
+    data = [file.stem for file in layout.data.iterdir()]
+    if any(sorted(names) != sorted(classes) for names in (described, data, of_behaviours.names(layout), SHOWN)):
         yield f"docs/behaviours: expected sections, campaigns, data and lines in shown.py for {sorted(classes)}"
         return
     for name, kind in classes.items():
@@ -94,45 +94,47 @@ def behaviour_pages() -> Problems:
         groups = tomllib.loads(_text(f"scenarios/behaviours/{name}.toml"))["robots"].values()
         if {group["agent"] for group in groups} != {f"swarmwire.agent.behaviours:{kind}"}:
             yield f"scenarios/behaviours/{name}.toml: has other agents than {kind}"
-        yield from _figure(degradation_of(name, places), places, f"python -m docs.behaviours draw {name}")
-        yield from _whole_campaign(name, places)
+        yield from _figure(degradation_of(name, layout), layout, f"python -m docs.behaviours draw {name}")
+        yield from _whole_campaign(name, layout)
 
 
-def _whole_campaign(name: str, places: Places) -> Problems:
-    file = places.campaigns / f"{name}.toml"
+def _whole_campaign(name: str, layout: Layout) -> Problems:
+    file = layout.campaigns / f"{name}.toml"
     campaign = campaign_file(file)
     if campaign is None:
         yield f"{file}: is a scenario, not a campaign"
         return
     plan = plan_of(spec_in(file, campaign))
-    [data] = digests(degradation_of(name, places), places).values()
+    [data] = digests(degradation_of(name, layout), layout).values()
     levels = [plan.vary()[path] for path in plan.vary()]
     same = [sorted(data[LOSS].unique()), sorted(data[LATENCY].unique())] == levels
     if not same or set(data["seed"]) != set(plan.spec.seeds) or len(data) != len(plan.points) * len(plan.spec.seeds):
-        yield f"{places.data / name}.parquet: is not of the whole campaign {file.name}"
+        yield f"{layout.data / name}.parquet: is not of the whole campaign {file.name}"
 
 
 def experiment_pages() -> Problems:
     """Each experiment has campaigns, data and a figure, and the numbers on its page are those of its data."""
-    for name in experiments(HERE):
-        experiment = find_experiment(name, HERE)
-        if missing := [of for of in experiment.campaigns if not (HERE.campaigns / f"{of}.toml").exists()]:
+    for name in experiments(LAYOUT):
+        experiment = find_experiment(name, LAYOUT)
+        if missing := [
+            campaign for campaign in experiment.campaigns if not (LAYOUT.campaigns / f"{campaign}.toml").exists()
+        ]:
             yield f"scenarios/papers: lacks the campaigns {missing} of {name}"
         if f"({name}.svg)" not in _text(f"docs/experiments/{name}.md"):
             yield f"docs/experiments/{name}.md: does not show {name}.svg"
-        yield from _experiment(experiment, HERE, f"python -m docs.experiments draw {name}")
+        yield from _experiment(experiment, LAYOUT, f"python -m docs.experiments draw {name}")
 
 
-def _experiment(experiment: Experiment, places: Places, draw: str) -> Problems:
-    page = places.pages / f"{experiment.name}.md"
-    files = page_files(page, experiment.numbers(digests(experiment, places)))
+def _experiment(experiment: Experiment, layout: Layout, draw: str) -> Problems:
+    page = layout.pages / f"{experiment.name}.md"
+    files = page_files(page, experiment.numbers(digests(experiment, layout)))
     if any(not file.exists() or file.read_text(encoding="utf-8") != text for file, text in files.items()):
         yield f"{page.relative_to(ROOT)}: its numbers are not those of its data: {draw}"
-    yield from _figure(experiment, places, draw)
+    yield from _figure(experiment, layout, draw)
 
 
-def _figure(experiment: Experiment, places: Places, draw: str) -> Problems:
-    figure = places.figure_of(experiment.name)
+def _figure(experiment: Experiment, layout: Layout, draw: str) -> Problems:
+    figure = layout.figure_of(experiment.name)
     if not figure.exists() or b"<svg" not in figure.read_bytes()[:1000]:
         yield f"{figure.relative_to(ROOT)}: no figure: {draw}"
 
@@ -167,28 +169,28 @@ def benchmark_rows() -> Problems:
 def fleet_keys() -> Problems:
     """The page about fleets has a row for every key of `fleet.toml`."""
     rows = [line.split("|")[1] for line in _text("docs/fleet.md").splitlines() if line.startswith("| `")]
-    told = {name for row in rows for name in row.split("`")[1::2]}
+    documented = {name for row in rows for name in row.split("`")[1::2]}
     yield from (
         f"docs/fleet.md: has no row for {key}"
-        for key in sorted({*FleetTable.__struct_fields__, *RobotTable.__struct_fields__} - told)
+        for key in sorted({*FleetTable.__struct_fields__, *RobotTable.__struct_fields__} - documented)
     )
 
 
 def robot_bytes() -> Problems:
     """The tables of the bytes that an e-puck2 takes and gives add up to the packets."""
     rows = re.compile(r"^\| (\d+)(?:-(\d+))? \| (?:(\d+) )?([iuf]\d) \|", re.MULTILINE)
-    told: list[tuple[str, int]] = []
+    documented: list[tuple[str, int]] = []
     for text, size in zip(_text("docs/epuck2.md").split("## Answer"), (COMMAND_BYTES, SENSORS.itemsize), strict=True):
-        place = 0
-        told = [(kind, int(count or 1)) for _, _, count, kind in rows.findall(text)]
-        for (first, last, _, _), (kind, count) in zip(rows.findall(text), told, strict=True):
-            if int(first) != place or int(last or first) + 1 != place + count * int(kind[1]):
-                yield f"docs/epuck2.md: expected the row of {kind} at byte {first} to begin at {place}"
-            place = int(last or first) + 1
-        if place != size:
-            yield f"docs/epuck2.md: expected {size} bytes in a table, got {place}"
+        position = 0
+        documented = [(kind, int(count or 1)) for _, _, count, kind in rows.findall(text)]
+        for (first, last, _, _), (kind, count) in zip(rows.findall(text), documented, strict=True):
+            if int(first) != position or int(last or first) + 1 != position + count * int(kind[1]):
+                yield f"docs/epuck2.md: expected the row of {kind} at byte {first} to begin at {position}"
+            position = int(last or first) + 1
+        if position != size:
+            yield f"docs/epuck2.md: expected {size} bytes in a table, got {position}"
     ours = [(SENSORS[name].base.str[1:], *(SENSORS[name].shape or (1,))) for name in SENSORS.names or ()]
-    if told != ours:
+    if documented != ours:
         yield f"docs/epuck2.md: expected the answer's fields {ours}"
 
 

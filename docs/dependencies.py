@@ -17,12 +17,15 @@ def licences() -> list[tuple[str, str, str]]:
     installs |= {f"`[{extra}]`": (OURS, extra) for extra in sorted(extras)}
     rows: dict[tuple[int, str], set[str]] = {}
     seen: set[str] = set()
-    for place, (root, extra) in enumerate(installs.values()):
+    for column, (root, extra) in enumerate(installs.values()):
         for name in sorted(_all_needed(root, extra) - seen):
             seen.add(name)
-            rows.setdefault((place, licence(name)), set()).add(name)
-    who = list(installs)
-    return [(who[place], ", ".join(sorted(names)), of) for (place, of), names in sorted(rows.items())]
+            rows.setdefault((column, licence(name)), set()).add(name)
+    installers = list(installs)
+    return [
+        (installers[column], ", ".join(sorted(names)), dependency)
+        for (column, dependency), names in sorted(rows.items())
+    ]
 
 
 def licence(name: str) -> str:
@@ -38,15 +41,15 @@ def _all_needed(root: str, extra: str) -> set[str]:
     """The distributions of others that an installation brings on this machine."""
     seen, waiting = set[tuple[str, str]](), [(root, ""), (root, extra)]
     while waiting:
-        name, wanted = waiting.pop()
-        if (name, wanted) not in seen:
-            seen.add((name, wanted))
-            waiting += _needed(name, wanted)
+        name, extra_wanted = waiting.pop()
+        if (name, extra_wanted) not in seen:
+            seen.add((name, extra_wanted))
+            waiting += _needed(name, extra_wanted)
     return {name for name, _ in seen if not name.startswith(OURS)}
 
 
 def _needed(name: str, extra: str) -> Iterable[tuple[str, str]]:
     for requirement in map(Requirement, distribution(name).requires or ()):
         if requirement.marker is None or requirement.marker.evaluate({"extra": extra}):
-            of = canonicalize_name(requirement.name)
-            yield from ((of, wanted) for wanted in ("", *requirement.extras))
+            dependency = canonicalize_name(requirement.name)
+            yield from ((dependency, extra_wanted) for extra_wanted in ("", *requirement.extras))

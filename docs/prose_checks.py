@@ -61,9 +61,9 @@ def _problems(name: str, first: int, text: str) -> Iterator[str]:
     for skipped in (FENCE, SPAN, TARGET, ATTRIBUTE):
         text = skipped.sub(lambda code: re.sub(r"[^\n]", "\0", code[0]), text)
     for pattern, instead in PATTERNS.items():
-        for found in pattern.finditer(text):
-            line = first + text.count("\n", 0, found.start())
-            words = " ".join(found[0].split())
+        for match in pattern.finditer(text):
+            line = first + text.count("\n", 0, match.start())
+            words = " ".join(match[0].split())
             yield f"{name}:{line}: '{words}': expected {instead}"
 
 

@@ -33,9 +33,9 @@ COUNTERS = (frames, frames, tick_frames, join_policy, registry, lockstep, realti
 def protocol_page() -> Iterator[str]:
     """What the page tells, each time beside what the code has."""
     page = _Page(PAGE.read_text(encoding="utf-8"))
-    for subject, told, ours in (*_joining(page), *_frames(page), *_numbers(page)):
-        if told != ours:
-            yield f"docs/protocol.md: {subject}: the page has {told}, the code has {ours}"
+    for subject, documented, ours in (*_joining(page), *_frames(page), *_numbers(page)):
+        if documented != ours:
+            yield f"docs/protocol.md: {subject}: the page has {documented}, the code has {ours}"
 
 
 class _Page:
@@ -44,8 +44,8 @@ class _Page:
 
     def table(self, name: str) -> dict[str, list[str]]:
         """The other cells of each row of a table, by the first; empty where there is no such table."""
-        found = re.search(rf"<!-- table: {name} -->\n((?:\|.*\n)+)", self.text)
-        lines = found[1].splitlines()[2:] if found else []
+        matched = re.search(rf"<!-- table: {name} -->\n((?:\|.*\n)+)", self.text)
+        lines = matched[1].splitlines()[2:] if matched else []
         rows = [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
         return {row[0].strip("`").replace("\\|", "|"): [cell.replace("\\|", "|") for cell in row[1:]] for row in rows}
 
@@ -63,7 +63,7 @@ def _joining(page: _Page) -> Iterator[Comparison]:
     for name in ("session_info", "join request", "assignment", "frame"):
         yield f"the version in {name}", page.table(name).get("v", ["", ""])[1], version
     keys = Keys("RUN")
-    named = {f"`{getattr(keys, of)('NAME')}`" for of in ("session_info", "join", "alive", "frame", "answer")}
+    named = {f"`{getattr(keys, key)('NAME')}`" for key in ("session_info", "join", "alive", "frame", "answer")}
     named.add(f"`{keys.world}`")
     yield "keys", named & set(page.text.split()), named
     group = GroupAssignment("g", "a", {}, load_body("epuck"), ROWS, ("g-0", "g-1"), np.zeros(2, np.uint64))
@@ -80,15 +80,23 @@ def _joining(page: _Page) -> Iterator[Comparison]:
 
 
 def _frames(page: _Page) -> Iterator[Comparison]:
-    one, zeros = np.zeros(1, np.int64), np.zeros(2)
-    received = ReceivedPackets(one, one, one, one, {"range_m": np.zeros(1)}, one, Payloads.from_rows([b"abc"]))
+    packet_row, zeros = np.zeros(1, np.int64), np.zeros(2)
+    received = ReceivedPackets(
+        packet_row,
+        packet_row,
+        packet_row,
+        packet_row,
+        {"range_m": np.zeros(1)},
+        packet_row,
+        Payloads.from_rows([b"abc"]),
+    )
     sensors = {"GROUP": GroupReadings(ROWS, {"SENSOR.FIELD": np.zeros(2)})}
     sent = SentPackets(ROWS, np.array([BROADCAST, 1]), Payloads.from_rows([b"a", b"b"]), np.array([-1, 0]))
     actions = replace(
         Actions(ROWS, zeros == 0, zeros, zeros, zeros, sent, SparseTable(ROWS, ROWS, zeros, ("x",))),
         **dict.fromkeys(("leds", "actuators", "values", "motors"), SparseTable(ROWS, ROWS, zeros)),
     )
-    tick = encode_tick(0, sensors, received, TxStatuses(one, one, one))
+    tick = encode_tick(0, sensors, received, TxStatuses(packet_row, packet_row, packet_row))
     for name, data in (("tick", tick), ("actions", encode_actions(0, actions))):
         ours = {array: (value.dtype.str, value.ndim) for array, value in frames.decode(data).arrays.items()}
         yield f"arrays of {name}", page.arrays(name), ours
@@ -99,7 +107,7 @@ def _frames(page: _Page) -> Iterator[Comparison]:
 def _numbers(page: _Page) -> Iterator[Comparison]:
     sizes = {code: dtype.itemsize for code, dtype in frames.DTYPES.items()}
     yield "bytes of dtypes", {code: int(size) for code, (_, size) in page.table("dtypes").items()}, sizes
-    yield "results of sending", [int(number) for number in page.table("results")], [of.value for of in TxResult]
+    yield "results of sending", [int(number) for number in page.table("results")], [key.value for key in TxResult]
     yield "the tag of Heading", re.findall(r"<!-- tag: Heading -->(\d+)", page.text), [str(Heading.tag)]
     limits = {field.name: float(getattr(LIMITS, field.name)) for field in fields(LIMITS)}
     limits |= {"frame": MAX_BYTES, "items": frames.MAX_ITEMS, "request to join": join.MAX_JOIN_BYTES}
@@ -110,8 +118,8 @@ def _numbers(page: _Page) -> Iterator[Comparison]:
     yield "counts", set(page.table("counted")), counted
 
 
-def _names(of: type[Any]) -> set[str]:
-    return {field.name for field in fields(of)}
+def _names(key: type[Any]) -> set[str]:
+    return {field.name for field in fields(key)}
 
 
 def _axes(shape: str) -> int:

@@ -14,22 +14,22 @@ from swarmwire.comms.base.errors import BadInput
 from tests.docs.pages import PAGES
 
 ROOT = Path(__file__).parents[1]
-PLACE = re.compile(r"(^<!-- reference: ([^\n]+) -->\n)(.*?)(^<!-- /reference -->$)", re.DOTALL | re.MULTILINE)
+MARKED = re.compile(r"(^<!-- reference: ([^\n]+) -->\n)(.*?)(^<!-- /reference -->$)", re.DOTALL | re.MULTILINE)
 BUILT = re.compile(r"^<!-- built: ([^\n]+) -->$", re.MULTILINE)
 
 
 def built(text: str, page: str) -> str:
     """Return the text with the tables that only the site has; BadInput for a table that does not exist."""
-    return BUILT.sub(lambda found: _table(found[1], page, found[0]), text)
+    return BUILT.sub(lambda match: _table(match[1], page, match[0]), text)
 
 
 def filled(text: str, page: str) -> str:
     """The text of a page with its tables as they are now; BadInput for a table that does not exist."""
 
-    def table(found: re.Match[str]) -> str:
-        return f"{found[1]}\n{_table(found[2], page, found[1].strip())}\n\n{found[4]}"
+    def table(match: re.Match[str]) -> str:
+        return f"{match[1]}\n{_table(match[2], page, match[1].strip())}\n\n{match[4]}"
 
-    return PLACE.sub(table, text)
+    return MARKED.sub(table, text)
 
 
 def _table(call: str, page: str, comment: str) -> str:

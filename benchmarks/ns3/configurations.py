@@ -53,7 +53,7 @@ class Configuration:
     interval_s: float  # 1 / a whole number of Hz
     # All within 1 m; "area": at random in a square; "line": nodes 0 and 1 send, the last receives; "pairs": on a line,
     # the first half sends, each to a node of the second half.
-    places: str = "spot"
+    layout: str = "spot"
     # Of an area its side, of a line the distances of senders to the receiver, of pairs the place of each node.
     size_m: tuple[float, ...] = (SPOT_M,)
     unicast: bool = False  # to the next node, or within the pair, acknowledged; else to all
@@ -76,7 +76,7 @@ class Configuration:
             "area": f"{distances} m square",
             "pairs": f"at {distances} m",
         }
-        return where[self.places] + (", mixed" if self.is_mixed else ", unicast" if self.unicast else "")
+        return where[self.layout] + (", mixed" if self.is_mixed else ", unicast" if self.unicast else "")
 
     @property
     def cells(self) -> list[str]:
@@ -97,7 +97,7 @@ class Configuration:
     @property
     def senders(self) -> int:
         """Nodes 0 to this one, excluded, send."""
-        return {"line": len(self.size_m), "pairs": self.nodes // 2}.get(self.places, self.nodes)
+        return {"line": len(self.size_m), "pairs": self.nodes // 2}.get(self.layout, self.nodes)
 
     @property
     def ticks(self) -> int:
@@ -129,10 +129,10 @@ class Configuration:
 
     def xy_m(self) -> FloatArray:
         """Where each node is, (seeds, nodes, 2); around the origin."""
-        if self.places == "line":
+        if self.layout == "line":
             ends = [(distance_m * (-1.0) ** index, 0.0) for index, distance_m in enumerate(self.size_m)]
             return np.tile(np.array([*ends, (0.0, 0.0)]), (self.seeds, 1, 1))
-        if self.places == "pairs":
+        if self.layout == "pairs":
             return np.tile(np.array([(x_m, 0.0) for x_m in self.size_m]), (self.seeds, 1, 1))
         draws = uniform(self.keys[:, None, None], np.arange(self.nodes)[:, None], np.arange(2), 0, POSITION_PURPOSE)
         return self.size_m[0] * (draws - 0.5)
@@ -147,7 +147,7 @@ class Configuration:
         """The receiver of a sender's packets; -1: all."""
         if not self.unicast or (self.is_mixed and sender % 2):
             return -1
-        return (sender + (self.senders if self.places == "pairs" else 1)) % self.nodes
+        return (sender + (self.senders if self.layout == "pairs" else 1)) % self.nodes
 
     def ns3_input(self, seed: int, walk_m: FloatArray | None = None) -> str:
         """What `network.cc` reads for one of the seeds, counted from 0; `walk_m` (ticks, nodes, 2) are other places."""
@@ -177,11 +177,11 @@ def _configuration(kind: Kind, nodes: int, octets: int, interval_ms: float, **mo
 
 
 def _line(kind: Kind, octets: int, interval_ms: float, *size_m: float, **more: Any) -> Configuration:
-    return _configuration(kind, len(size_m) + 1, octets, interval_ms, places="line", size_m=size_m, **{**FEW, **more})
+    return _configuration(kind, len(size_m) + 1, octets, interval_ms, layout="line", size_m=size_m, **{**FEW, **more})
 
 
 def _area(kind: Kind, octets: int, interval_ms: float, side_m: float, **more: Any) -> Configuration:
-    return _configuration(kind, 40, octets, interval_ms, places="area", size_m=(side_m,), **more)
+    return _configuration(kind, 40, octets, interval_ms, layout="area", size_m=(side_m,), **more)
 
 
 def spot() -> list[Configuration]:

@@ -30,18 +30,18 @@ def setup(app: Sphinx) -> ExtensionMetadata:
     return {"version": "1", "parallel_read_safe": True}
 
 
-def _prepare(_app: Sphinx, what: str, name: str, _object: Any, _options: Any, lines: list[str]) -> None:
+def _prepare(_app: Sphinx, object_type: str, name: str, _object: Any, _options: Any, lines: list[str]) -> None:
     """Convert a docstring to reStructuredText, in place.
 
     The docstring of a module is for maintainers; the page introduces the module. A field without a comment gets the
     help of its `parameter`. Napoleon alone would take "value: what it means" in a property's docstring for a type and a
     meaning; the docstrings here are sentences.
     """
-    if what == "module":
+    if object_type == "module":
         lines.clear()
     elif lines and any(lines):
-        lines[:] = GoogleDocstring([_escaped(line) for line in lines], what="method").lines()
-    elif what == "attribute":
+        lines[:] = GoogleDocstring([_escaped(line) for line in lines], object_type="method").lines()
+    elif object_type == "attribute":
         lines[:] = [_escaped(_help_of(name))]
 
 

@@ -6,7 +6,7 @@ import typer
 from rich.console import Console
 
 from docs.behaviours.degradation import degradation_of
-from docs.behaviours.shown import HERE, draw_picture, find_shown, names
+from docs.behaviours.shown import LAYOUT, draw_picture, find_shown, names
 from docs.experiments.making import draw, run, run_app
 from swarmwire.deploy.campaigns.sweep import ExecutionOptions
 from swarmwire.deploy.terminal.output import echo, flowing
@@ -27,37 +27,37 @@ Workers = Annotated[int | None, typer.Option(help="Worker processes of a sweep. 
 @app.command("list")
 def list_command() -> None:
     """Name the behaviours, with what is measured of each."""
-    for name in names(HERE):
-        echo(f"{name}: {find_shown(name, HERE).title}")
+    for name in names(LAYOUT):
+        echo(f"{name}: {find_shown(name, LAYOUT).title}")
 
 
 @app.command("picture")
-def picture_command(asked: Names = None) -> None:
+def picture_command(chosen: Names = None) -> None:
     """Run the scenario and draw it, with the ways of the robots."""
-    for name in asked or names(HERE):
-        echo(f"drawn: {draw_picture(name, HERE)}")
+    for name in chosen or names(LAYOUT):
+        echo(f"drawn: {draw_picture(name, LAYOUT)}")
 
 
 @app.command("degrade")
-def degrade_command(asked: Names = None, workers: Workers = None) -> None:
+def degrade_command(chosen: Names = None, workers: Workers = None) -> None:
     """Sweep the missing runs of the campaign, digest it, draw the figure, and print its numbers."""
-    for name in asked or names(HERE):
+    for name in chosen or names(LAYOUT):
         options = ExecutionOptions(workers=workers)
-        echo(run(degradation_of(name, HERE), HERE, None, options, Console(highlight=False)))
+        echo(run(degradation_of(name, LAYOUT), LAYOUT, None, options, Console(highlight=False)))
 
 
 @app.command("draw")
-def draw_command(asked: Names = None) -> None:
+def draw_command(chosen: Names = None) -> None:
     """Draw the figure from the existing digest, and print its numbers."""
-    for name in asked or names(HERE):
-        echo(draw(degradation_of(name, HERE), HERE))
+    for name in chosen or names(LAYOUT):
+        echo(draw(degradation_of(name, LAYOUT), LAYOUT))
 
 
 @app.command("all")
-def all_command(asked: Names = None, workers: Workers = None) -> None:
+def all_command(chosen: Names = None, workers: Workers = None) -> None:
     """Make the pictures and figures of the pages."""
-    picture_command(asked)
-    degrade_command(asked, workers)
+    picture_command(chosen)
+    degrade_command(chosen, workers)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from docs.behaviours.shown import Shown, find_shown
-from docs.experiments.experiment import Experiment, Places
+from docs.experiments.experiment import Experiment, Layout
 from swarmwire.metrics.pictures.report.axes import plain_legend
 from swarmwire.metrics.pictures.report.charts import MedianLine, response_curve
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
@@ -21,9 +21,9 @@ DIGITS = 3
 HEAD_ROOM = 1.2  # above the lines, for the legend
 
 
-def degradation_of(name: str, places: Places) -> Experiment:
+def degradation_of(name: str, layout: Layout) -> Experiment:
     """The behaviour's campaign as an experiment, which `docs.experiments` sweeps, digests and draws."""
-    shown = find_shown(name, places)
+    shown = find_shown(name, layout)
     return Experiment(name, shown.title, (name,), (), _Degradation(name, shown))
 
 
@@ -46,8 +46,8 @@ class _Degradation:
             sample = campaign.sample(self.shown.response, number)
             rows = pl.DataFrame({"seed": sample.seed, "value": sample.value, "observed": sample.observed})
             at = {LOSS: point[loss], LATENCY: point[latency]}
-            said = [pl.lit(float(str(value))).alias(key) for key, value in at.items()]
-            parts.append(rows.select(*said, "seed", "value", "observed", pl.lit(sample.kind).alias("kind")))
+            fixed_columns = [pl.lit(float(str(value))).alias(key) for key, value in at.items()]
+            parts.append(rows.select(*fixed_columns, "seed", "value", "observed", pl.lit(sample.kind).alias("kind")))
         return pl.concat(parts)
 
     def draw(self, runs: Mapping[str, pl.DataFrame]) -> Any:
@@ -77,9 +77,9 @@ class _Degradation:
         for loss in _levels(frame, LOSS):
             cells = [_words(_sample(frame, loss, latency)) for latency in latencies]
             lines.append(f"| {100 * loss:g} % | {' | '.join(cells)} |")
-        of = "Medians" if _is_time(frame) else "Means"
+        kind = "Medians" if _is_time(frame) else "Means"
         runs_each = int(frame.group_by(LOSS, LATENCY).len()["len"].to_numpy().max())
-        about = f"{of} of {runs_each} runs each, with 95 % intervals: {self.shown.title}."
+        about = f"{kind} of {runs_each} runs each, with 95 % intervals: {self.shown.title}."
         return "\n".join([*lines, "", about])
 
 
@@ -92,20 +92,20 @@ def _is_time(frame: pl.DataFrame) -> bool:
 
 
 def _sample(frame: pl.DataFrame, loss: float, latency_s: float) -> Sample:
-    own = frame.filter(pl.col(LOSS) == loss, pl.col(LATENCY) == latency_s)
-    columns = (own[name].to_numpy() for name in ("value", "observed", "seed"))
+    cell_frame = frame.filter(pl.col(LOSS) == loss, pl.col(LATENCY) == latency_s)
+    columns = (cell_frame[name].to_numpy() for name in ("value", "observed", "seed"))
     return Sample(*columns, kind="time" if _is_time(frame) else "number")
 
 
 def _middle(sample: Sample) -> tuple[float, Interval]:
     """The median of times, which may be cut off, and the mean of numbers; with its interval."""
-    of = summary(sample)
-    return (of.q50, of.q50_interval) if sample.kind == "time" else (of.mean, of.mean_interval)
+    numbers = summary(sample)
+    return (numbers.q50, numbers.q50_interval) if sample.kind == "time" else (numbers.mean, numbers.mean_interval)
 
 
 def _line(label: str, x: list[float], samples: list[Sample]) -> MedianLine:
-    found = [_middle(sample) for sample in samples]
-    table = np.array([(middle, of.low, of.high) for middle, of in found])
+    middles = [_middle(sample) for sample in samples]
+    table = np.array([(middle, interval.low, interval.high) for middle, interval in middles])
     if samples[0].kind == "time":
         table[np.isnan(table)] = np.inf  # beyond the limit
     middle, low, high = table.T
@@ -113,10 +113,10 @@ def _line(label: str, x: list[float], samples: list[Sample]) -> MedianLine:
 
 
 def _words(sample: Sample) -> str:
-    middle, of = _middle(sample)
+    middle, interval = _middle(sample)
     if sample.kind == "time" and np.isnan(middle):
         return f"beyond {_rounded(float(np.max(sample.value)))}"
-    low, high = (_rounded(end) if np.isfinite(end) else "…" for end in (of.low, of.high))
+    low, high = (_rounded(end) if np.isfinite(end) else "…" for end in (interval.low, interval.high))
     return f"{_rounded(middle)} ({low}–{high})"
 
 

@@ -4,16 +4,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from docs.experiments.experiment import ROOT, Places
+from docs.experiments.experiment import ROOT, Layout
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
 
 PACKETS, RAYS, INFRARED, SCANS = "packets", "rays' readings", "infrared rays' readings", "scanner's readings"
 BEFORE_WALLS = "oscillation", "deadlocked"  # how robots fare that something holds up
 CONTACTS = "contacts between robots per robot-hour"
-FOUND = "time until half of them are at the light, s"
+TIME_LABEL = "time until half of them are at the light, s"
 SCENARIOS = ROOT / "scenarios" / "behaviours"
-HERE = Places(
+LAYOUT = Layout(
     figures=ROOT / "docs" / "behaviours",
     campaigns=SCENARIOS / "campaigns",
     swept=ROOT / "campaigns" / "behaviours",
@@ -58,9 +58,9 @@ SHOWN = {
         ("aggregation", "aggregation_hop"),
         lost=INFRARED,
     ),
-    "pso_model": Shown(FOUND, "find_time_s", ("target_best", "target_mean")),
-    "pso_search": Shown(FOUND, "find_time_s", ("target_best", "target_mean")),
-    "pso_search_positioned": Shown(FOUND, "find_time_s", ("target_best", "target_mean")),
+    "pso_model": Shown(TIME_LABEL, "find_time_s", ("target_best", "target_mean")),
+    "pso_search": Shown(TIME_LABEL, "find_time_s", ("target_best", "target_mean")),
+    "pso_search_positioned": Shown(TIME_LABEL, "find_time_s", ("target_best", "target_mean")),
     "random_walk": Shown("share of the floor that was covered, at the end", "coverage.final", ("coverage",), lost=RAYS),
     "smoothed_avoidance": Shown(CONTACTS, "collision_rate.final", BEFORE_WALLS, 30.0, lost=SCANS),
     "smoothed_avoidance_proximity": Shown(CONTACTS, "collision_rate.final", BEFORE_WALLS, 30.0, lost=RAYS),
@@ -90,22 +90,22 @@ def page_of(name: str) -> str:
     return next(page for page, members in PAGES.items() if name in members)
 
 
-def find_shown(name: str, places: Places) -> Shown:
+def find_shown(name: str, layout: Layout) -> Shown:
     """What is shown of a behaviour; BadInput names those that there are, or says that it has no campaign."""
     if name not in SHOWN:
         raise BadInput("NAME", name, f"unknown behaviour; expected {did_you_mean(SHOWN, name)}")
-    campaign = places.campaigns / f"{name}.toml"
+    campaign = layout.campaigns / f"{name}.toml"
     if not campaign.exists():
         raise BadInput(str(campaign), "", "is missing: expected the campaign of a behaviour")
     return SHOWN[name]
 
 
-def names(places: Places) -> tuple[str, ...]:
+def names(layout: Layout) -> tuple[str, ...]:
     """Of all behaviours that have a campaign, in the order of the alphabet."""
-    return tuple(sorted(file.stem for file in places.campaigns.glob("*.toml")))
+    return tuple(sorted(file.stem for file in layout.campaigns.glob("*.toml")))
 
 
-def draw_picture(name: str, places: Places) -> Path:
+def draw_picture(name: str, layout: Layout) -> Path:
     """Run the behaviour's scenario and draw it into NAME.png; where that is."""
     from PIL import Image
 
@@ -114,7 +114,7 @@ def draw_picture(name: str, places: Places) -> Path:
     from swarmwire.metrics.pictures.drawing.film import film_of
     from swarmwire.metrics.records.run_folder.reader import RunFolder
 
-    shown, to = find_shown(name, places), places.pages / f"{name}.png"
+    shown, to = find_shown(name, layout), layout.pages / f"{name}.png"
     with TemporaryDirectory() as folder:
         run(SCENARIOS / f"{name}.toml", out=folder, record=Recording(rrd=False))
         film = film_of(RunFolder(Path(folder)), 0, name)

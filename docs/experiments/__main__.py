@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from docs.experiments.experiment import HERE, find_experiment, names
+from docs.experiments.experiment import LAYOUT, find_experiment, names
 from docs.experiments.making import digest, draw, run, run_app
 from swarmwire.deploy.campaigns.sweep import ExecutionOptions
 from swarmwire.deploy.terminal.output import echo, flowing
@@ -24,8 +24,8 @@ Name = Annotated[str, typer.Argument(help="The experiment, as `list` has it.", m
 @app.command("list")
 def list_command() -> None:
     """Name the experiments, with their campaigns."""
-    for name in names(HERE):
-        experiment = find_experiment(name, HERE)
+    for name in names(LAYOUT):
+        experiment = find_experiment(name, LAYOUT)
         echo(f"{name}: {experiment.about}")
         echo(f"    {', '.join(experiment.campaigns)}")
 
@@ -35,10 +35,10 @@ def draw_command(
     chosen: Annotated[list[str] | None, typer.Argument(help="Experiments; all without.", metavar="NAME…")] = None,
 ) -> None:
     """Draw NAME.svg from the digests that are there, and put the numbers into NAME.md."""
-    for name in chosen or names(HERE):
-        experiment = find_experiment(name, HERE)
-        echo(draw(experiment, HERE))
-        echo(f"drawn: {HERE.figure_of(experiment.name)}")
+    for name in chosen or names(LAYOUT):
+        experiment = find_experiment(name, LAYOUT)
+        echo(draw(experiment, LAYOUT))
+        echo(f"drawn: {LAYOUT.figure_of(experiment.name)}")
 
 
 @app.command("digest")
@@ -53,7 +53,7 @@ def digest_command(
     ] = None,
 ) -> None:
     """Keep of finished campaigns what the figure and the numbers are made from."""
-    for file in digest(find_experiment(name, HERE), HERE, folders or ()):
+    for file in digest(find_experiment(name, LAYOUT), LAYOUT, folders or ()):
         echo(f"written: {file}")
 
 
@@ -75,7 +75,7 @@ def run_command(
     kill, what is missing is run.
     """
     console = Console(highlight=False)
-    echo(run(find_experiment(name, HERE), HERE, seeds, ExecutionOptions(workers=workers), console))
+    echo(run(find_experiment(name, LAYOUT), LAYOUT, seeds, ExecutionOptions(workers=workers), console))
 
 
 if __name__ == "__main__":

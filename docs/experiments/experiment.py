@@ -24,7 +24,7 @@ NEEDED = ("CAMPAIGNS", "COLUMNS", "draw", "numbers")
 
 
 @dataclass(frozen=True)
-class Places:
+class Layout:
     """Folders of experiments: what is written by hand, and what their commands make."""
 
     figures: Path  # NAME.py: what is kept, drawn and told
@@ -38,13 +38,13 @@ class Places:
         """Where the figure of an experiment lies."""
         return self.pages / f"{name}{self.figure_ending}"
 
-    def trial(self, seeds: str) -> "Places":
+    def trial(self, seeds: str) -> "Layout":
         """The same with all that is made put aside: a trial with a few seeds must not replace what is published."""
         aside = self.swept / f"seeds-{seeds.replace(':', '-').replace(',', '-')}"
         return replace(self, swept=aside, data=aside / "data", pages=aside)
 
 
-HERE = Places(
+LAYOUT = Layout(
     figures=ROOT / "docs" / "experiments" / "figures",
     campaigns=ROOT / "scenarios" / "papers",
     swept=ROOT / "campaigns" / "papers",
@@ -76,19 +76,19 @@ class Experiment:
         return self.module.digested(folder, runs) if hasattr(self.module, "digested") else None
 
 
-def names(places: Places) -> tuple[str, ...]:
+def names(layout: Layout) -> tuple[str, ...]:
     """Of all experiments, in the order of the alphabet."""
-    files = places.figures.glob("[a-z]*.py")
+    files = layout.figures.glob("[a-z]*.py")
     return tuple(sorted(file.stem.replace("_", "-") for file in files))
 
 
-def find_experiment(name: str, places: Places) -> Experiment:
+def find_experiment(name: str, layout: Layout) -> Experiment:
     """The experiment of this name; BadInput names those that there are, or what its file lacks."""
-    known_names = names(places)
+    known_names = names(layout)
     name = name.replace("_", "-")
     if name not in known_names:
         raise BadInput("NAME", name, f"unknown experiment; expected {did_you_mean(known_names, name)}")
-    file = places.figures / f"{name.replace('-', '_')}.py"
+    file = layout.figures / f"{name.replace('-', '_')}.py"
     module = _module(file)
     for required in NEEDED:
         if not hasattr(module, required):

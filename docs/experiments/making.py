@@ -15,7 +15,7 @@ import polars as pl
 import typer
 from rich.console import Console
 
-from docs.experiments.experiment import Experiment, Places
+from docs.experiments.experiment import Experiment, Layout
 from swarmwire.comms.base.atomic import output_file, write_text
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput, Interrupted, SwarmwireError
@@ -38,23 +38,23 @@ TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 BEGIN_MARK, END_MARK = "<!-- numbers -->", "<!-- /numbers -->"
 
 
-def digest(experiment: Experiment, places: Places, folders: Sequence[Path] = ()) -> list[Path]:
+def digest(experiment: Experiment, layout: Layout, folders: Sequence[Path] = ()) -> list[Path]:
     """Write the digests of an experiment's campaigns, each of which must be over; the files that were written.
 
     `folders` are campaigns' folders, named as the campaigns, or a single one; none: all that lie where they are swept.
     BadInput for a folder that is of no campaign of the experiment, or not over, and for digests that are too large.
     """
     written: list[Path] = []
-    for campaign, folder in _folders(experiment, places, folders).items():
+    for campaign, folder in _folders(experiment, layout, folders).items():
         frame = digest_of(experiment, folder)
-        places.data.mkdir(parents=True, exist_ok=True)
-        written.append(places.data / f"{campaign}.parquet")
+        layout.data.mkdir(parents=True, exist_ok=True)
+        written.append(layout.data / f"{campaign}.parquet")
         with output_file(written[-1]) as aside:
             frame.write_parquet(aside, compression="zstd", compression_level=9, statistics=False)
-    size = sum(file.stat().st_size for file in _files(experiment, places) if file.exists())
+    size = sum(file.stat().st_size for file in _files(experiment, layout) if file.exists())
     if size > MAX_BYTES:
         expected = f"expected at most {MAX_BYTES / 1e6:g} MB in all, got {size / 1e6:.1f}: keep fewer columns"
-        raise BadInput(str(places.data), experiment.name, expected)
+        raise BadInput(str(layout.data), experiment.name, expected)
     return written
 
 
@@ -80,23 +80,23 @@ def digest_of(experiment: Experiment, folder: Path) -> pl.DataFrame:
     return campaign.runs.select(*chosen)
 
 
-def digests(experiment: Experiment, places: Places) -> Mapping[str, pl.DataFrame]:
+def digests(experiment: Experiment, layout: Layout) -> Mapping[str, pl.DataFrame]:
     """The digests of an experiment by campaign; BadInput if one is missing."""
-    for file in _files(experiment, places):
+    for file in _files(experiment, layout):
         if not file.exists():
             raise BadInput(str(file), "", f"is missing: expected a digest; run or digest {experiment.name} first")
-    return {file.stem: pl.read_parquet(file) for file in _files(experiment, places)}
+    return {file.stem: pl.read_parquet(file) for file in _files(experiment, layout)}
 
 
-def _files(experiment: Experiment, places: Places) -> list[Path]:
-    return [places.data / f"{campaign}.parquet" for campaign in experiment.campaigns]
+def _files(experiment: Experiment, layout: Layout) -> list[Path]:
+    return [layout.data / f"{campaign}.parquet" for campaign in experiment.campaigns]
 
 
-def _folders(experiment: Experiment, places: Places, folders: Sequence[Path]) -> dict[str, Path]:
+def _folders(experiment: Experiment, layout: Layout, folders: Sequence[Path]) -> dict[str, Path]:
     """Folders by campaign."""
     campaigns = experiment.campaigns
     if not folders:
-        return {campaign: places.swept / campaign for campaign in campaigns}
+        return {campaign: layout.swept / campaign for campaign in campaigns}
     if len(folders) == len(campaigns) == 1:
         return {campaigns[0]: folders[0]}
     for folder in folders:
@@ -109,16 +109,16 @@ def _folders(experiment: Experiment, places: Places, folders: Sequence[Path]) ->
     return {folder.name: folder for folder in folders}
 
 
-def draw(experiment: Experiment, places: Places) -> str:
+def draw(experiment: Experiment, layout: Layout) -> str:
     """Draw an experiment, put its numbers into its page if there is one, and return them.
 
     BadInput where a digest is missing, or the page has no place for the numbers.
     """
-    runs = digests(experiment, places)
+    runs = digests(experiment, layout)
     numbers_text = experiment.numbers(runs)
-    page = places.pages / f"{experiment.name}.md"
+    page = layout.pages / f"{experiment.name}.md"
     files = page_files(page, numbers_text) if page.exists() else {}
-    save(experiment.draw(runs), places.figure_of(experiment.name))
+    save(experiment.draw(runs), layout.figure_of(experiment.name))
     for file, text in files.items():
         file.parent.mkdir(exist_ok=True)
         write_text(file, text)
@@ -158,14 +158,14 @@ def csv_text(rows: Sequence[Sequence[str]]) -> str:
     return file.getvalue()
 
 
-def run(experiment: Experiment, places: Places, seeds: str | None, options: ExecutionOptions, console: Console) -> str:
+def run(experiment: Experiment, layout: Layout, seeds: str | None, options: ExecutionOptions, console: Console) -> str:
     """Sweep what is missing of an experiment's campaigns, digest and draw it; the numbers.
 
     With `seeds` other seeds than the campaigns' own are taken, in folders of their own. BadInput as of `swarmwire
     sweep`, and if a campaign that lies there is not the one that its file describes now; Interrupted by Ctrl-C: the
     same call goes on.
     """
-    where = places if seeds is None else places.trial(seeds)
+    where = layout if seeds is None else layout.trial(seeds)
     for name in experiment.campaigns:
         swept = _swept(where.campaigns / f"{name}.toml", where.swept / name, seeds, options, console)
         if swept is not None and not swept.is_over:

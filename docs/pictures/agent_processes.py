@@ -44,11 +44,11 @@ def _machine(left: float, title: str, first: int, processes: int) -> list[str]:
 
 
 def _process(middle: float, y: float, fill: str, name: str, *lines: str) -> list[str]:
-    said = [text(middle, y + 36.0 + 15.0 * at, of, 11, anchor="middle") for at, of in enumerate(lines)]
+    texts = [text(middle, y + 36.0 + 15.0 * at, line, 11, anchor="middle") for at, line in enumerate(lines)]
     return [
         box(middle - 60.0, y, 120.0, 60.0, fill),
         text(middle, y + 18.0, name, 13, anchor="middle", bold=True),
-        *said,
+        *texts,
     ]
 
 

@@ -108,8 +108,8 @@ class Hero:
             if ends is not None
         ]
         left, right, top = edge_in / WIDTH_IN, 1.0 - edge_in / WIDTH_IN, 1.0 - 0.3 / HEIGHT_IN
-        said = f"{films[0].static.robots} e-pucks, one start, three radios"
-        figure.text(left, top, said, fontsize=HEAD_PT + 2.0, fontweight="bold", color=INK)
+        caption = f"{films[0].static.robots} e-pucks, one start, three radios"
+        figure.text(left, top, caption, fontsize=HEAD_PT + 2.0, fontweight="bold", color=INK)
         self._time: Any = figure.text(right, top, "", fontsize=HEAD_PT, color=INK, ha="right")
         look: dict[str, Any] = {"frameon": False, "fontsize": TEXT_PT, "labelcolor": INK, "borderaxespad": 0.0}
         entries = packet_entries((Fate.RECEIVED, Fate.LOST))

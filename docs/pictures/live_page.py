@@ -69,13 +69,13 @@ def _until(page: Page, tick: int) -> None:
 def _address(run: "subprocess.Popen[str]") -> str:
     assert run.stdout is not None
     for line in run.stdout:
-        if found := re.search(r"http://127\.0\.0\.1:\d+/\S+/", line):
-            return found[0]
+        if address := re.search(r"http://127\.0\.0\.1:\d+/\S+/", line):
+            return address[0]
     raise SystemExit("the run told no address")
 
 
 if __name__ == "__main__":
-    given = dict(enumerate(sys.argv[1:]))
-    size_px = int(given.get(1, "1400")), int(given.get(2, "900"))
-    scheme = cast("Literal['dark', 'light']", given.get(3, "dark"))
-    main(Path(given.get(0, DOCS / "page.png")), *size_px, scheme)
+    arguments = dict(enumerate(sys.argv[1:]))
+    size_px = int(arguments.get(1, "1400")), int(arguments.get(2, "900"))
+    scheme = cast("Literal['dark', 'light']", arguments.get(3, "dark"))
+    main(Path(arguments.get(0, DOCS / "page.png")), *size_px, scheme)

@@ -32,5 +32,5 @@ def main(page: Path, heading: str, picture: Path, width_px: int, height_px: int)
 
 
 if __name__ == "__main__":
-    of, _, at = sys.argv[1].partition("#")
-    main(Path(of), at, Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]))
+    file, _, at = sys.argv[1].partition("#")
+    main(Path(file), at, Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]))

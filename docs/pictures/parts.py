@@ -8,7 +8,7 @@ from docs.pictures.svg import arrow, box, page, text
 ROOT = Path(__file__).parents[2]
 TO = ROOT / "docs" / "parts.svg"
 WIDTH, GAP = 880.0, 56.0  # between one row of parts and the next
-PLACES = {  # x, y, width, height
+BOXES = {  # x, y, width, height
     "deploy": (10.0, 10.0, 860.0, 74.0),
     "world": (10.0, 140.0, 280.0, 133.0),
     "metrics": (300.0, 140.0, 280.0, 133.0),
@@ -29,19 +29,19 @@ FILLS = {"deploy": "#f1f5f9", "world": "#dbeafe", "metrics": "#fef3c7", "agent":
 def draw(to: Path = TO) -> None:
     """Write the figure."""
     shapes: list[str] = []
-    for part in PLACES:
+    for part in BOXES:
         shapes += _part(part)
     for part in ("world", "metrics", "agent"):  # an arrow from deploy, and one to comms
         for imported in (part, "comms"):
-            shapes.append(_import(PLACES[part][0] + 140, PLACES[imported][1] - GAP))
-    down = PLACES["comms"][1] + PLACES["comms"][3]
+            shapes.append(_import(BOXES[part][0] + 140, BOXES[imported][1] - GAP))
+    down = BOXES["comms"][1] + BOXES["comms"][3]
     note = "An arrow is an import that is allowed. deploy may import comms, too."
     shapes.append(text(WIDTH / 2, down + 24, note, anchor="middle"))
     to.write_text(page("The parts and who imports whom", WIDTH, down + 38, shapes), encoding="utf-8")
 
 
 def _part(part: str) -> list[str]:
-    x, y, width, height = PLACES[part]
+    x, y, width, height = BOXES[part]
     code = ROOT / part / "swarmwire" / part
     folders = sorted(path.parent.name for path in code.glob("*/__init__.py"))
     files = sorted(path.stem for path in code.glob("*.py") if not path.stem.startswith("_"))

@@ -55,8 +55,8 @@ def _company() -> list[str]:
 
 
 def _network() -> list[str]:
-    said = "the swarm's network: zenoh over TLS; each member is authenticated by its certificate"
-    return [box(10, NETWORK_Y, WIDTH - 20, 34, NETWORK), text(WIDTH / 2, NETWORK_Y + 22, said, anchor="middle")]
+    caption = "the swarm's network: zenoh over TLS; each member is authenticated by its certificate"
+    return [box(10, NETWORK_Y, WIDTH - 20, 34, NETWORK), text(WIDTH / 2, NETWORK_Y + 22, caption, anchor="middle")]
 
 
 def _robot(x: float, agent: tuple[str, str, str], robot: tuple[str, str]) -> list[str]:
@@ -74,8 +74,8 @@ def _robot(x: float, agent: tuple[str, str, str], robot: tuple[str, str]) -> lis
     ]
 
 
-def _titled(x: float, y: float, fill: str, title: str, said: str) -> str:
-    return box(x, y, BOX_WIDTH, 52, fill) + text(x + 10, y + 21, title, 14, bold=True) + text(x + 10, y + 40, said)
+def _titled(x: float, y: float, fill: str, title: str, caption: str) -> str:
+    return box(x, y, BOX_WIDTH, 52, fill) + text(x + 10, y + 21, title, 14, bold=True) + text(x + 10, y + 40, caption)
 
 
 if __name__ == "__main__":

@@ -34,20 +34,20 @@ def draw(to: Path = DOCS / "routing.svg") -> None:
     scenario = load_scenario(MESH, [])
     before, after = _routes(len(scenario.robot_names()))
     edges = _edges(scenario)
-    places = [(LEFT + SCALE * x, TOP - SCALE * y) for x, y in _positions(scenario)]
+    points = [(LEFT + SCALE * x, TOP - SCALE * y) for x, y in _positions(scenario)]
     shapes = [
-        *_panel(0, "radio graph: within 2 m", places, edges, {}, None),
-        *_panel(1, f"babeld's routes to {DESTINATION}", places, edges, before, None),
-        *_panel(2, f"after the death of {DEAD}", places, edges, after, DEAD),
+        *_panel(0, "radio graph: within 2 m", points, edges, {}, None),
+        *_panel(1, f"babeld's routes to {DESTINATION}", points, edges, before, None),
+        *_panel(2, f"after the death of {DEAD}", points, edges, after, DEAD),
     ]
     title = f"Ten robots: their radio graph, and the routes to robot {DESTINATION} before and after robot {DEAD} died"
     to.write_text(page(title, 3 * PANEL, HEIGHT, shapes), encoding="utf-8")
 
 
 def _positions(scenario: Scenario) -> list[tuple[float, float]]:
-    place = scenario.robots["mesh"].place
-    assert isinstance(place, AtPoses)
-    return [(x, y) for x, y, _ in place.poses]
+    positions = scenario.robots["mesh"].place
+    assert isinstance(positions, AtPoses)
+    return [(x, y) for x, y, _ in positions.poses]
 
 
 def _edges(scenario: Scenario) -> list[tuple[int, int]]:
@@ -88,11 +88,13 @@ def _converged(out: Path, robots: set[int]) -> Routes:
 
 
 def _next(out: Path, robot: int) -> int | None:
-    addresses = {name: of["ipv4"].partition("/")[0] for name, of in json.loads((out / INTERFACES).read_text()).items()}
+    addresses = {
+        name: robot["ipv4"].partition("/")[0] for name, robot in json.loads((out / INTERFACES).read_text()).items()
+    }
     to = addresses[f"mesh-{DESTINATION}"]
     command = [sys.executable, "-m", "swarmwire.deploy", "exec", str(out), f"mesh-{robot}", "--"]
-    found = subprocess.run([*command, "ip", "route", "show", to], capture_output=True, text=True, check=False).stdout
-    via = re.search(r"via ([\d.]+)", found)
+    printed = subprocess.run([*command, "ip", "route", "show", to], capture_output=True, text=True, check=False).stdout
+    via = re.search(r"via ([\d.]+)", printed)
     names = {address: name for name, address in addresses.items()}
     return int(names[via[1]].removeprefix("mesh-")) if via else None
 
@@ -100,12 +102,12 @@ def _next(out: Path, robot: int) -> int | None:
 def _panel(
     number: int,
     title: str,
-    places: list[tuple[float, float]],
+    points: list[tuple[float, float]],
     edges: list[tuple[int, int]],
     routes: Routes,
     dead: int | None,
 ) -> list[str]:
-    at = [(x + number * PANEL, y) for x, y in places]
+    at = [(x + number * PANEL, y) for x, y in points]
     shapes = [text(LEFT + SCALE * MIDDLE + number * PANEL, 24.0, title, 14, anchor="middle", bold=True)]
     shapes += [
         f'<path d="M{at[a][0]:g} {at[a][1]:g} L{at[b][0]:g} {at[b][1]:g}" stroke="{FAINT}" fill="none"/>'

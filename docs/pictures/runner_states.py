@@ -14,15 +14,15 @@ from swarmwire.world.backends import allocation
 
 DOCS = Path(__file__).parents[1]
 Moves = Mapping[str, Mapping[str, str]]
-Places = Mapping[str, tuple[float, float]]
-WORLD: Places = {
+Points = Mapping[str, tuple[float, float]]
+WORLD: Points = {
     "free": (70.0, 150.0),
     "joined": (240.0, 150.0),
     "ready": (410.0, 150.0),
     "waiting": (600.0, 150.0),
     "dead": (410.0, 280.0),
 }
-RUNNER: Places = {
+RUNNER: Points = {
     "searching": (60.0, 90.0),
     "joining": (200.0, 90.0),
     "joined": (360.0, 90.0),
@@ -37,7 +37,7 @@ RISE = 0.2  # of an arrow back, for its length
 
 def draw(to: Path = DOCS / "runner-states.svg") -> None:
     """Write the figure of the world's side."""
-    moves: Moves = {state: {**of} for state, of in allocation.MOVES.items()}
+    moves: Moves = {state: {**moves_of_state} for state, moves_of_state in allocation.MOVES.items()}
     shapes = _states(moves, WORLD)
     to.write_text(page("The states of the robots that one runner plays", 680, 320, shapes), encoding="utf-8")
 
@@ -45,8 +45,8 @@ def draw(to: Path = DOCS / "runner-states.svg") -> None:
 def draw_protocol(to: Path = DOCS / "runner-protocol.svg") -> None:
     """Write the figure of the runner's side, without the moves that lead nowhere and those that all states have."""
     moves: dict[str, dict[str, str]] = {
-        state: {move: after for move, after in of.items() if after not in ("ended", state)}
-        for state, of in runner_protocol.MOVES.items()
+        state: {move: after for move, after in moves_of_state.items() if after not in ("ended", state)}
+        for state, moves_of_state in runner_protocol.MOVES.items()
     }
     shared = _shared(moves, WITH_ROBOTS)  # moves that start from the frame around these states
     for state in WITH_ROBOTS:
@@ -63,26 +63,30 @@ def draw_protocol(to: Path = DOCS / "runner-protocol.svg") -> None:
 def _shared(moves: Moves, states: Sequence[str]) -> dict[str, str]:
     """The moves that all these states have, to the same state."""
     first, *others = (moves[state] for state in states)
-    return {move: after for move, after in first.items() if all(of.get(move) == after for of in others)}
+    return {
+        move: after
+        for move, after in first.items()
+        if all(moves_of_state.get(move) == after for moves_of_state in others)
+    }
 
 
-def _states(moves: Moves, places: Places) -> list[str]:
+def _states(moves: Moves, points: Points) -> list[str]:
     """Every state of the table once, every move from it an arrow."""
     shapes = [
         shape
-        for state, of in moves.items()
-        for move, after in of.items()
-        for shape in _arrow(places, state, move, after)
+        for state, moves_of_state in moves.items()
+        for move, after in moves_of_state.items()
+        for shape in _arrow(points, state, move, after)
     ]
     for state in moves:
-        x, y = places[state]
+        x, y = points[state]
         shapes.append(box(x - HALF_WIDTH, y - HALF_HEIGHT, 2 * HALF_WIDTH, 2 * HALF_HEIGHT, "#dbeafe"))
         shapes.append(text(x, y + 5, state, 14, anchor="middle", bold=True))
     return shapes
 
 
-def _arrow(places: Places, state: str, move: str, after: str) -> list[str]:
-    (x, y), (to_x, to_y) = places[state], places[after]
+def _arrow(points: Points, state: str, move: str, after: str) -> list[str]:
+    (x, y), (to_x, to_y) = points[state], points[after]
     top, middle_x = y - HALF_HEIGHT, 0.5 * (x + to_x)
     if to_y > y:  # down, to the nearer part of the box
         end_x, end_y = to_x + 0.2 * (x - to_x), to_y - HALF_HEIGHT

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from docs.pictures.radio.sheet import line_color, panels, say
+from docs.pictures.radio.sheet import line_color, panels, set_labels
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.observe.truth import Group
@@ -55,7 +55,7 @@ def draw(to: Path = TO) -> None:
         axes.plot(at_s, truth, color=FAINT, lw=1.2)
         axes.plot(at_s, readings_of(title), ".", ms=2.6, color=line_color(i))
         axes.set_ylim(-0.05, 1.05)
-        say(axes, title, "time in s", "reading" if i == 0 else "")
+        set_labels(axes, title, "time in s", "reading" if i == 0 else "")
     save(figure, to)
 
 

@@ -10,10 +10,10 @@ def box(x: float, y: float, width: float, height: float, fill: str) -> str:
     return f'<rect x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" rx="5" fill="{fill}" stroke="{FAINT}"/>'
 
 
-def text(x: float, y: float, said: str, size: int = 12, *, anchor: str = "start", bold: bool = False) -> str:
+def text(x: float, y: float, words: str, size: int = 12, *, anchor: str = "start", bold: bool = False) -> str:
     """One line of text; `anchor` is start, middle or end."""
     weight = ' font-weight="bold"' if bold else ""
-    return f'<text x="{x:g}" y="{y:g}" font-size="{size}" text-anchor="{anchor}"{weight}>{escape(said)}</text>'
+    return f'<text x="{x:g}" y="{y:g}" font-size="{size}" text-anchor="{anchor}"{weight}>{escape(words)}</text>'
 
 
 def arrow(x: float, y: float, to_x: float, to_y: float) -> str:

@@ -34,10 +34,10 @@ def _step(step: Step, y: float) -> list[str]:
 
 def _by_giver(step: Step) -> dict[str, str]:
     """What a step takes, a text for each lane that gave it."""
-    given: dict[str, list[str]] = {}
+    inputs: dict[str, list[str]] = {}
     for name, giver in step.takes:
-        given.setdefault(giver, []).append(name)
-    return {giver: ", ".join(names) for giver, names in given.items()}
+        inputs.setdefault(giver, []).append(name)
+    return {giver: ", ".join(names) for giver, names in inputs.items()}
 
 
 def _middle(lane: str) -> float:

@@ -34,22 +34,22 @@ def _steps(method: Callable[..., object], givers: dict[str, str]) -> Iterator[St
     body = ast.parse(textwrap.dedent(inspect.getsource(method)))
     statements = [node for node in ast.walk(body) if isinstance(node, ast.Assign | ast.Expr)]
     for statement in sorted(statements, key=lambda node: node.lineno):
-        own = _own_method(statement.value) if isinstance(statement, ast.Assign) else None
-        if own is not None:
-            yield from _steps(own, givers)
+        called = _own_method(statement.value) if isinstance(statement, ast.Assign) else None
+        if called is not None:
+            yield from _steps(called, givers)
             continue
         yield from (_step(call, givers) for call in _calls(statement.value))
         if isinstance(statement, ast.Assign):
-            givers |= _given(statement.targets[0], statement.value, givers)
+            givers |= _inputs(statement.targets[0], statement.value, givers)
 
 
-def _given(target: ast.expr, value: ast.expr, givers: dict[str, str]) -> dict[str, str]:
+def _inputs(target: ast.expr, value: ast.expr, givers: dict[str, str]) -> dict[str, str]:
     """Of each name that is assigned to, the lane that it came from."""
     if isinstance(value, ast.Name) and value.id == "inputs":
         return {}  # what the first part of a tick hands to the second keeps its names
     if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
         pairs = zip(target.elts, value.elts, strict=True)
-        return {name: lane for each in pairs for name, lane in _given(*each, givers).items()}
+        return {name: lane for each in pairs for name, lane in _inputs(*each, givers).items()}
     names = [node.id for node in ast.walk(target) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
     return dict.fromkeys(names, _giver(value, givers))
 
@@ -73,7 +73,7 @@ def _calls(value: ast.expr) -> Iterator[ast.Call]:
 
 def _step(call: ast.Call, givers: dict[str, str]) -> Step:
     lane = _lane(call.func)
-    nodes = [node for given in call.args for node in ast.walk(given)]
+    nodes = [node for argument in call.args for node in ast.walk(argument)]
     names = [(node.id, givers.get(node.id, lane)) for node in nodes if isinstance(node, ast.Name)]
     names += [(node.attr, _lane(node)) for node in nodes if isinstance(node, ast.Attribute)]  # such as `world.pose`
     takes = {name: giver for name, giver in names if giver not in {"", lane}}

@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from docs.behaviours.degradation import degradation_of
-from docs.behaviours.shown import HERE, SCENARIOS, find_shown
+from docs.behaviours.shown import LAYOUT, SCENARIOS, find_shown
 from docs.experiments.making import run as run_experiment
 from swarmwire.agent import behaviours
 from swarmwire.comms.base.errors import BadInput
@@ -42,7 +42,7 @@ overrides = ['duration_s = 20', 'robots.nodes.count = 4', 'arena.size_m = [1.0, 
 "radio.loss" = [0.0, 1.0]
 "radio.latency_s" = [0.0, 0.5]
 """)
-    own = replace(HERE, campaigns=tmp_path, swept=tmp_path / "swept", data=tmp_path / "data", pages=tmp_path)
+    own = replace(LAYOUT, campaigns=tmp_path, swept=tmp_path / "swept", data=tmp_path / "data", pages=tmp_path)
     told = run_experiment(degradation_of("consensus", own), own, None, ExecutionOptions(workers=1), Console(quiet=True))
     rows = [line.split("|")[1:-1] for line in told.splitlines() if "%" in line and "|" in line]
     assert [row[0].strip() for row in rows] == ["0 %", "100 %"]
@@ -54,6 +54,6 @@ overrides = ['duration_s = 20', 'robots.nodes.count = 4', 'arena.size_m = [1.0, 
 
 def test_unknown_behaviour_or_campaign_is_refused_with_its_kind(tmp_path):
     with pytest.raises(BadInput, match="unknown behaviour"):
-        find_shown("flying", HERE)
+        find_shown("flying", LAYOUT)
     with pytest.raises(BadInput, match="expected the campaign of a behaviour"):
-        find_shown("flocking", replace(HERE, campaigns=tmp_path))
+        find_shown("flocking", replace(LAYOUT, campaigns=tmp_path))

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 from numba import njit
 
-from docs.experiments.experiment import HERE, Experiment, find_experiment
+from docs.experiments.experiment import LAYOUT, Experiment, find_experiment
 from docs.experiments.making import digest_of
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
@@ -45,7 +45,7 @@ def miniature(
     `overrides` are for all its campaigns. With `campaigns` only these are run, and nothing is drawn or told. No run may
     fail.
     """
-    experiment = find_experiment(name, HERE)
+    experiment = find_experiment(name, LAYOUT)
     asked = experiment.campaigns if campaigns is None else campaigns
     runs = {campaign: _digest(experiment, campaign, folder, seeds, vary or {}, overrides) for campaign in asked}
     if campaigns is not None:
@@ -61,7 +61,7 @@ def _digest(
     vary: Mapping[str, Any],
     overrides: Sequence[str],
 ) -> pl.DataFrame:
-    file = HERE.campaigns / f"{campaign}.toml"
+    file = LAYOUT.campaigns / f"{campaign}.toml"
     found = campaign_file(file)
     assert found is not None, file
     spec = replace(spec_in(file, found), seeds=seed_list(seeds))

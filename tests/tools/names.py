@@ -1,7 +1,7 @@
 """The names check of `make check`: identifiers are nouns and verbs of the field, and a class name occurs once.
 
 `python -m tests.tools.names` prints every refused name as `file:line: name: expectation`; the exit code is then 1. It
-refuses identifiers in all parts of the product, and class names that one of these parts repeats.
+refuses identifiers in all parts of the product and in the programs beside them, and class names that a part repeats.
 `--counts` prints, for each part, the numbers of refused identifiers, and of docstrings and comments that point at the
 code instead of describing it. `--texts` also lists those docstrings and comments, in every part.
 """
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 PARTS = "comms", "agent", "world", "metrics", "deploy"
+PROGRAMS = "docs", "benchmarks", "examples", "scenarios"
 
 REFUSED = frozenset(
     (
@@ -116,8 +117,8 @@ def _comments(source: str) -> Iterator[tuple[int, str]]:
 
 
 def breaches_of(root: Path, part: str) -> Iterator[Breach]:
-    """Refused identifiers, and docstrings and comments that point, in the files of a part."""
-    for path in sorted((root / part / "swarmwire").rglob("*.py")):
+    """Refused identifiers, and docstrings and comments that point, in the files of a part or of programs."""
+    for path in sorted((root / part / ("swarmwire" if part in PARTS else "")).rglob("*.py")):
         source, file = path.read_text(), path.relative_to(root)
         tree = ast.parse(source)
         for line, name in [(1, path.stem), *_identifiers(tree)]:
@@ -159,7 +160,9 @@ def main() -> int:
     parser.add_argument("--under", default="", help="only files whose path contains this text")
     options = parser.parse_args()
     root = Path(__file__).parents[2]
-    breaches = {part: [b for b in breaches_of(root, part) if options.under in str(b.file)] for part in PARTS}
+    breaches = {
+        part: [b for b in breaches_of(root, part) if options.under in str(b.file)] for part in (*PARTS, *PROGRAMS)
+    }
     repeated = repeated_classes(root)
     if options.counts:
         for part, listed in breaches.items():
@@ -168,8 +171,8 @@ def main() -> int:
         print(f"{len(repeated)} repeated class names")
         return 0
     refused = False
-    for part in PARTS:
-        for breach in breaches[part]:
+    for listed in breaches.values():
+        for breach in listed:
             is_refused = breach.kind == "identifier"
             if is_refused or options.texts:
                 print(f"{breach.file}:{breach.line}: {breach.text}: {EXPECTED[breach.kind]}")

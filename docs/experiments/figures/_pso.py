@@ -106,7 +106,7 @@ def _distances(folder: Path) -> pl.DataFrame:
 
 def against_model(robots: pl.DataFrame, model: pl.DataFrame, column: str, name: str) -> str:
     """Time to the first and to half by what a column says, robots beside point particles."""
-    head = [name, *(f"{event}: {who}" for event in ("first", "half") for who in COMPARED)]
+    head = [name, *(f"{event}: {agent}" for event in ("first", "half") for agent in COMPARED)]
     rows: list[list[str]] = []
     for value in robots[column].unique(maintain_order=True):
         row = [f"{value:g}"]
@@ -155,13 +155,13 @@ class Kind:
     """Who searched: what their campaigns' names end with, what they are called, and their colour."""
 
     suffix: str
-    who: str
+    label: str
     color: str
 
     @property
     def look(self) -> Look:
         """Of their curves."""
-        return {"color": self.color, "marker": "o", "ms": 3, "lw": 1.3, "zorder": 4, "label": self.who}
+        return {"color": self.color, "marker": "o", "ms": 3, "lw": 1.3, "zorder": 4, "label": self.label}
 
 
 def panels(titles: Sequence[tuple[str, str]]) -> tuple[Any, list[Any]]:

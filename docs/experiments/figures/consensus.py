@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import polars as pl
 
-from docs.experiments.experiment import HERE
+from docs.experiments.experiment import LAYOUT
 from docs.experiments.figures._consensus_model import Graph, graph_of
 from docs.experiments.figures._side_by_side import legend, mean_and_interval, panels, table
 from swarmwire.comms.base.arrays import FloatArray
@@ -111,7 +111,7 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
 
 
 def _graph(scenario: str, range_m: float | None) -> Graph:
-    return graph_of(HERE.campaigns / "scenarios" / f"{scenario}.toml", range_m)
+    return graph_of(LAYOUT.campaigns / "scenarios" / f"{scenario}.toml", range_m)
 
 
 def _points(runs: Mapping[str, pl.DataFrame]) -> Iterator[Point]:

@@ -28,7 +28,7 @@ TASKS = (
 )
 CAMPAIGNS = tuple(f"learning-{task.name}{suffix}" for task in TASKS for suffix in ("-rule", ""))
 COLUMNS = ()  # `digested` chooses
-WHO = {  # by what the file's name ends with; "": no file
+AGENTS = {  # by what the file's name ends with; "": no file
     "": ("hand-written rule", SOFT),
     "lossless.onnx": ("trained without loss", ACCENT),
     "lossy.onnx": ("trained under loss", CURVE),
@@ -58,9 +58,11 @@ def results(runs: Mapping[str, pl.DataFrame], task: Task) -> Mapping[str, Mappin
     both = pl.concat([runs[f"learning-{task.name}-rule"], runs[f"learning-{task.name}"]])
     ran = both.filter(pl.col("ended") != "failed").sort("seed")
     by_agent: dict[str, dict[float, pl.DataFrame]] = {}
-    for end, (who, _) in WHO.items():
+    for end, (agent_label, _) in AGENTS.items():
         agent_runs = ran.filter(pl.col("agent").str.ends_with(f"-{end}") if end else pl.col("agent") == "")
-        by_agent[who] = {loss: agent_runs.filter(pl.col("loss") == loss) for loss in agent_runs["loss"].unique().sort()}
+        by_agent[agent_label] = {
+            loss: agent_runs.filter(pl.col("loss") == loss) for loss in agent_runs["loss"].unique().sort()
+        }
     return by_agent
 
 
@@ -73,8 +75,8 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     """A panel for each task: means over seeds with their intervals."""
     figure, axes = panels(*((task.title, "packet loss") for task in TASKS))
     for ax, task in zip(axes, TASKS, strict=True):
-        for (who, by_loss), (_, color) in zip(results(runs, task).items(), WHO.values(), strict=True):
-            means(ax, list(by_loss), [values(group) for group in by_loss.values()], color=color, label=who)
+        for (agent_label, by_loss), (_, color) in zip(results(runs, task).items(), AGENTS.values(), strict=True):
+            means(ax, list(by_loss), [values(group) for group in by_loss.values()], color=color, label=agent_label)
         ax.set_ylim(bottom=0.0)
     legend(axes[0], loc="lower left")
     return figure
@@ -110,9 +112,10 @@ def _apart(first: pl.DataFrame, second: pl.DataFrame, task: Task) -> str:
 def _contacts(by_agent: Mapping[str, Mapping[float, pl.DataFrame]]) -> str:
     """Contacts between robots a run, over all losses."""
     every = {
-        who: pl.concat(by_loss.values())["collisions"].cast(pl.Float64).to_numpy() for who, by_loss in by_agent.items()
+        agent_label: pl.concat(by_loss.values())["collisions"].cast(pl.Float64).to_numpy()
+        for agent_label, by_loss in by_agent.items()
     }
-    contacts = ", ".join(f"{who} {collisions.mean():.1f}" for who, collisions in every.items())
+    contacts = ", ".join(f"{agent_label} {collisions.mean():.1f}" for agent_label, collisions in every.items())
     return f"Contacts between robots a run, over all losses: {contacts}."
 
 

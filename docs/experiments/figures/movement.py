@@ -84,13 +84,13 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     for looking in (True, False):
         for side, radius, looks, group in points(runs["movement"]):
             if looks == looking:
-                who = "look" if looks else "do not look"
+                readers = "look" if looks else "do not look"
                 summaries = [mean_of(group, name) for name in MEASURES]
                 rows.append(
                     (
                         f"{side:g} x {side:g}",
                         f"{2.0 * radius:g}",
-                        who,
+                        readers,
                         *(_within(statistics.mean, statistics.mean_interval) for statistics in summaries),
                     )
                 )

@@ -96,7 +96,7 @@ def _by_range(shares: Any, soon: Any, runs: Mapping[str, pl.DataFrame]) -> None:
         by_range = [at(runs[f"pso-range{kind.suffix}"], radio__range_m=range_m) for range_m in ranges]
         half, first = ([times(each, response) for each in by_range] for response in (HALF, FIRST))
         share_curve(shares, ranges, half, kind.look)
-        few: Look = {**kind.look, "ls": ":", "lw": 0.9, "ms": 2, "label": f"{kind.who}: the first"}
+        few: Look = {**kind.look, "ls": ":", "lw": 0.9, "ms": 2, "label": f"{kind.label}: the first"}
         share_curve(shares, ranges, first, few)
         time_curve(soon, ranges, half, kind.look)
     shares.set_ylim(0.0, 1.03)
@@ -119,14 +119,14 @@ def _by_radio(axes: Any, runs: Mapping[str, pl.DataFrame], campaign: str, column
     for kind in KINDS:
         for range_m, style, reach in REACHES if f"{campaign}{kind.suffix}" in runs else ():
             selected = at(runs[f"{campaign}{kind.suffix}"], radio__range_m=range_m)
-            look: Look = {**kind.look, "ls": style, "label": f"{kind.who}, {reach}"}
+            look: Look = {**kind.look, "ls": style, "label": f"{kind.label}, {reach}"}
             time_curve(axes, *times_by(selected, column), look)
 
 
 def _on_ring(axes: Any, runs: pl.DataFrame) -> None:
     """How soon half of them are there; dashed: what was received counts until the next update."""
-    for count, who, color in ((0, "all", CURVE), (10, "ring", ACCENT)):
+    for count, label, color in ((0, "all", CURVE), (10, "ring", ACCENT)):
         for keeps, style, how in ((True, "-", "kept"), (False, "--", "asked anew")):
             selected = runs.filter((pl.col(RING) == count) & (pl.col(KEEPS) == keeps))
-            look: Look = {**Kind("", f"{who}, {how}", color).look, "ls": style}
+            look: Look = {**Kind("", f"{label}, {how}", color).look, "ls": style}
             time_curve(axes, *times_by(selected, "radio.loss"), look)

@@ -27,5 +27,5 @@ FIGURES = {
 }
 
 if __name__ == "__main__":
-    for asked in sys.argv[1:] or FIGURES:
-        FIGURES[asked]()
+    for figure in sys.argv[1:] or FIGURES:
+        FIGURES[figure]()

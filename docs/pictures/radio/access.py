@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.ns3.closed_forms import aloha as throughput
 from benchmarks.ns3.comparison import recorded
 from benchmarks.ns3.configurations import SECTIONS, radio_like_ns3
-from docs.pictures.radio.sheet import legend, line_color, panels, say, write
+from docs.pictures.radio.sheet import legend, line_color, panels, set_labels, write
 from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.comms.radio.config.phy import Access
 from swarmwire.metrics.pictures.drawing.canvas import INK
@@ -30,7 +30,9 @@ def draw() -> None:
     aloha.plot(fine, fine * np.exp(-2.0 * fine), color=line_color(0), lw=1.4, label="G exp(-2G)")
     aloha.plot(LOADS, [throughput(load, ALOHA_TICKS) for load in LOADS], "o", ms=3.5, color=line_color(1), label="ours")
     aloha.set_ylim(0.0, 0.24)
-    say(aloha, "ALOHA without capture", "load G: frames begun per airtime", "throughput S: frames received per airtime")
+    set_labels(
+        aloha, "ALOHA without capture", "load G: frames begun per airtime", "throughput S: frames received per airtime"
+    )
     legend(aloha, "upper right", ncols=2, columnspacing=1.0)
 
     for index, method in enumerate(METHODS):
@@ -54,7 +56,7 @@ def _over_nodes(axes, title: str) -> None:
     axes.set_xticks(NODES, [str(nodes) for nodes in NODES])
     axes.minorticks_off()
     axes.set_ylim(0.0, 1.05)
-    say(axes, title, "nodes in one spot", "share received")
+    set_labels(axes, title, "nodes in one spot", "share received")
 
 
 def _curve(
@@ -62,18 +64,18 @@ def _curve(
 ) -> None:
     """Our delivery over the number of nodes."""
     radio = replace(radio_like_ns3(*kind), access=Access(method))
-    found = [contention(radio, nodes, payload_bytes, interval_s, SEEDS).pdr for nodes in NODES]
-    axes.plot(NODES, found, color=line_color(index), lw=1.4, label=name)
+    delivery = [contention(radio, nodes, payload_bytes, interval_s, SEEDS).pdr for nodes in NODES]
+    axes.plot(NODES, delivery, color=line_color(index), lw=1.4, label=name)
 
 
 def _points(axes, kind: tuple[str, float], payload_bytes: int, interval_s: float) -> None:
     """ns-3's delivery, where it was run."""
-    found = recorded()
-    asked = (*kind, payload_bytes, interval_s)
+    figures = recorded()
+    radio = (*kind, payload_bytes, interval_s)
     rows = [
-        one for one in SECTIONS["spot"]() if (one.standard, one.rate_mbps, one.payload_bytes, one.interval_s) == asked
+        row for row in SECTIONS["spot"]() if (row.standard, row.rate_mbps, row.payload_bytes, row.interval_s) == radio
     ]
     shown = [handle.get_label() for handle in axes.lines]
     label = None if "ns-3" in shown else "ns-3"
-    delivery = [found[one]["delivery"].mean() for one in rows]
-    axes.plot([one.nodes for one in rows], delivery, "x", ms=5, color=INK, label=label)
+    delivery = [figures[row]["delivery"].mean() for row in rows]
+    axes.plot([row.nodes for row in rows], delivery, "x", ms=5, color=INK, label=label)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from docs.pictures.radio.sheet import legend, line_color, panels, say, write
+from docs.pictures.radio.sheet import legend, line_color, panels, set_labels, write
 from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import derive_key
@@ -34,14 +34,14 @@ def draw() -> None:
     time.set_yticks(range(1, SHOWN + 1), [f"0 to {SHOWN - row}" for row in range(SHOWN)])
     time.set_xlim(0.0, SHOWN_PACKETS * INTERVAL_S)
     time.grid(visible=False, axis="y")
-    say(time, "when links are bad: 0.5 s at a time, good for 2 s", "time in s", "from robot to robot")
+    set_labels(time, "when links are bad: 0.5 s at a time, good for 2 s", "time in s", "from robot to robot")
     lengths = run_lengths(lost)
     counts = np.bincount(np.minimum(lengths, LONGEST + 1), minlength=LONGEST + 2)[1 : LONGEST + 1]
     at = np.arange(1, LONGEST + 1)
     runs.plot(at, expected_runs(BURSTS, INTERVAL_S, LONGEST), color=line_color(0), lw=1.4, label="geometric")
     runs.plot(at, counts / len(lengths), "o", ms=3, color=line_color(1), label=f"{len(lengths)} runs")
     runs.set_yscale("log")
-    say(runs, "runs of lost packets, one each 0.1 s", "length in packets", "share of runs")
+    set_labels(runs, "runs of lost packets, one each 0.1 s", "length in packets", "share of runs")
     legend(runs, "upper right")
     write(figure, "bursts")
 

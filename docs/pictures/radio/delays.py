@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from docs.pictures.radio.sheet import legend, line_color, panels, say, write
+from docs.pictures.radio.sheet import legend, line_color, panels, set_labels, write
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays
 from swarmwire.comms.radio.stages.delays import delay_distribution, varying_delay_ns
 
@@ -24,9 +24,9 @@ def draw() -> None:
         spread.stairs(share / len(DRAWS), BINS_MS, color=line_color(index), lw=1.3, label=distribution)
         late_ms = 1e-6 * np.array([varying_delay_ns(law, 1.0 - above) for above in TAIL])
         tails.plot(late_ms, TAIL, color=line_color(index), lw=1.4)
-    say(spread, "mean 20 ms, standard deviation 8 ms", "delay in ms", "share in each ms")
+    set_labels(spread, "mean 20 ms, standard deviation 8 ms", "delay in ms", "share in each ms")
     legend(spread, "upper right")
     tails.set_yscale("log")
     tails.set_xlim(0.0, 250.0)
-    say(tails, "how many are later than that", "delay in ms", "share of packets")
+    set_labels(tails, "how many are later than that", "delay in ms", "share of packets")
     write(figure, "delays")

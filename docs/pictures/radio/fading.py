@@ -5,7 +5,7 @@
 import numpy as np
 from scipy import special, stats
 
-from docs.pictures.radio.sheet import legend, legend_below, line_color, panels, say, write
+from docs.pictures.radio.sheet import legend, legend_below, line_color, panels, set_labels, write
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key, uniform
 from swarmwire.comms.radio.config.phy import Fading
@@ -29,27 +29,27 @@ LAGS = np.linspace(0.0, 2.0, 26)  # wavelengths
 def draw() -> None:
     """Write fading.svg."""
     figure, (way, shares, lags) = panels(3, 2.75, (1.25, 1.0, 1.0))
-    places = 50.0 * uniform(int(KEY), np.arange(PAIRS)[:, None], np.arange(4), 0, 0)
+    positions = 50.0 * uniform(int(KEY), np.arange(PAIRS)[:, None], np.arange(4), 0, 0)
     for index, (label, (fading, theory)) in enumerate(KINDS.items()):
         law = fading_model(fading, FREQUENCY_HZ)
         along = [to_db(fading_gain(law, KEY, 0, 1, 3.0, 4.0, x, 0.0)) for x in WAY_M]
         way.plot(WAY_M, along, color=line_color(index), lw=1.1, label=label)
-        gains = np.sort([fading_gain(law, KEY, 0, pair + 1, *place) for pair, place in enumerate(places)])
+        gains = np.sort([fading_gain(law, KEY, 0, pair + 1, *position) for pair, position in enumerate(positions)])
         below = (np.arange(PAIRS) + 0.5) / PAIRS
         every = np.unique(np.geomspace(20, PAIRS, 20).astype(int)) - 1
         shares.plot([to_db(g) for g in gains[every]], below[every], "o", ms=3, color=line_color(index))
         fine_db = np.linspace(-32.0, 8.0, 80)
         shares.plot(fine_db, theory.cdf(10.0 ** (fine_db / 10.0)), color=line_color(index), lw=1.2)
-    say(way, "power along 1 m of a robot's way", "way in m", "power in dB over the mean")
+    set_labels(way, "power along 1 m of a robot's way", "way in m", "power in dB over the mean")
     shares.set_yscale("log")
     shares.set_xlim(-32.0, 10.0)
     shares.set_ylim(1e-3, 1.3)
-    say(shares, "its distribution", "power in dB over the mean", "share below (lines: theory)")
+    set_labels(shares, "its distribution", "power in dB over the mean", "share below (lines: theory)")
     fine = np.linspace(0.0, LAGS[-1], 120)
     lags.axhline(0.0, color=INK, lw=0.6)
     lags.plot(fine, special.j0(2.0 * np.pi * fine), color=line_color(0), lw=1.4, label="J₀(2π s / λ)")
     lags.plot(LAGS, correlation(), "o", ms=3, color=line_color(1), label=f"{LAG_PAIRS} pairs")
-    say(lags, "its autocorrelation", "way s in wavelengths", "correlation of amplitudes")
+    set_labels(lags, "its autocorrelation", "way s in wavelengths", "correlation of amplitudes")
     legend(lags, "upper right")
     legend_below(figure, way, len(KINDS))
     write(figure, "fading")
@@ -64,5 +64,5 @@ def correlation() -> list[float]:
 
 def amplitudes(per_m: float, moved_m: float) -> FloatArray:
     """The amplitude h of each pair, (LAG_PAIRS,) complex."""
-    place = 1.0, 2.0, 30.0 + moved_m, -7.0
-    return np.array([complex(*scattered_between(KEY, per_m, 0, 1 + k, *place)) for k in range(LAG_PAIRS)])
+    position = 1.0, 2.0, 30.0 + moved_m, -7.0
+    return np.array([complex(*scattered_between(KEY, per_m, 0, 1 + k, *position)) for k in range(LAG_PAIRS)])

@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from docs.pictures.radio.sheet import legend, line_color, panels, say, write
+from docs.pictures.radio.sheet import legend, line_color, panels, set_labels, write
 from swarmwire.comms.radio.config.path_loss_models import Friis, ItuIndoor, LogDistance, TwoRay
 from swarmwire.comms.radio.propagation.path_loss import loss_db
 
@@ -42,6 +42,6 @@ def draw() -> None:
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
     axes.invert_yaxis()
-    say(axes, "path loss at 2.44 GHz; below 1 m it stays that of 1 m", "distance in m", "loss in dB")
+    set_labels(axes, "path loss at 2.44 GHz; below 1 m it stays that of 1 m", "distance in m", "loss in dB")
     legend(axes, "lower left")
     write(figure, "path-loss")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from docs.pictures.radio.sheet import line_color, panels, say, write
+from docs.pictures.radio.sheet import line_color, panels, set_labels, write
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception import error_rates
 from swarmwire.comms.radio.reception.receiver import (
@@ -29,13 +29,13 @@ def draw() -> None:
     figure, (short, dsss_axes, ofdm_axes) = panels(3, 2.7, (1.0, 1.0, 1.4))
     receivers = [(str(octets), ieee802154(), 8 * octets) for octets in OCTETS_154]
     _draw(short, receivers, (-5.0, 3.0))
-    say(short, "802.15.4, by octets", "SINR in dB", "share of frames that are right")
+    set_labels(short, "802.15.4, by octets", "SINR in dB", "share of frames that are right")
     receivers = [(f"{rate / 1e6:g}", ieee80211b(rate), 8 * OCTETS_B) for rate in DSSS_RATES_BPS]
     _draw(dsss_axes, receivers, (-6.0, 10.0))
-    say(dsss_axes, f"802.11b, {OCTETS_B} octets, by Mbit/s", "SINR in dB", "")
+    set_labels(dsss_axes, f"802.11b, {OCTETS_B} octets, by Mbit/s", "SINR in dB", "")
     receivers = [(f"{rate / 1e6:g}", ieee80211ag(rate), 8 * OCTETS_AG) for rate in error_rates.OFDM_RATES_BPS]
     _draw(ofdm_axes, receivers, (-2.0, 22.0))
-    say(ofdm_axes, f"802.11a/g, {OCTETS_AG} octets, by Mbit/s", "SINR in dB", "")
+    set_labels(ofdm_axes, f"802.11a/g, {OCTETS_AG} octets, by Mbit/s", "SINR in dB", "")
     write(figure, "reception")
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from docs.pictures.radio.sheet import legend, line_color, panels, say, scale, write
+from docs.pictures.radio.sheet import legend, line_color, panels, scale, set_labels, write
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.radio.config.phy import Shadowing
@@ -29,21 +29,21 @@ def draw() -> None:
     figure, (field, links, variogram) = panels(3, 2.7, (1.0, 1.0, 1.1))
     half_m = 0.5 * FIELD_LINK_M
     _map(figure, field, 3.0, lambda x, y: shadowing_db(waves[0], amplitude, x - half_m, y, x + half_m, y))
-    say(field, "the field: links of 1 m", "x in m", "y in m")
+    set_labels(field, "the field: links of 1 m", "x in m", "y in m")
     _map(figure, links, 10.0, lambda x, y: shadowing_db(waves[0], amplitude, 0.0, 0.0, x, y))
     links.plot(0.0, 0.0, "o", ms=4, color=INK)
-    say(links, "links of one robot", "x in m", "")
+    set_labels(links, "links of one robot", "x in m", "")
 
     half_squares = []
-    here = np.array([shadowing_db(arena, amplitude, 0.0, 0.0, LENGTH_M, 0.0) for arena in waves])
+    first_db = np.array([shadowing_db(arena, amplitude, 0.0, 0.0, LENGTH_M, 0.0) for arena in waves])
     for moved_m in MOVED_M:
-        there = np.array([shadowing_db(arena, amplitude, 0.0, moved_m, LENGTH_M, moved_m) for arena in waves])
-        half_squares.append(0.5 * np.mean((there - here) ** 2))
+        second_db = np.array([shadowing_db(arena, amplitude, 0.0, moved_m, LENGTH_M, moved_m) for arena in waves])
+        half_squares.append(0.5 * np.mean((second_db - first_db) ** 2))
     fine_m = np.linspace(0.0, MOVED_M[-1], 80)
     variogram.plot(fine_m, expected(fine_m), color=line_color(0), lw=1.5, label="definition")
     variogram.plot(MOVED_M, half_squares, "o", ms=3.5, color=line_color(1), label=f"{ARENAS} arenas")
     variogram.set_ylim(0.0, None)
-    say(variogram, "variogram, a link of 2 m moved", "moved by, in m", "half the mean square change in dB²")
+    set_labels(variogram, "variogram, a link of 2 m moved", "moved by, in m", "half the mean square change in dB²")
     legend(variogram, "lower right")
     write(figure, "shadowing")
 
@@ -51,19 +51,19 @@ def draw() -> None:
 def _map(figure: Any, axes: Any, most_db: float, loss_db: Callable[[float, float], float]) -> None:
     """A loss at each place."""
     at_m = np.linspace(-0.5 * SIDE_M, 0.5 * SIDE_M, STEPS)
-    found = [[loss_db(x, y) for x in at_m] for y in at_m]
+    losses_db = [[loss_db(x, y) for x in at_m] for y in at_m]
     look = {"cmap": "RdBu_r", "vmin": -most_db, "vmax": most_db, "origin": "lower", "interpolation": "none"}
-    image = axes.imshow(found, extent=(at_m[0], at_m[-1], at_m[0], at_m[-1]), **look)
+    image = axes.imshow(losses_db, extent=(at_m[0], at_m[-1], at_m[0], at_m[-1]), **look)
     axes.grid(visible=False)
     scale(figure, image, axes, "loss in dB", location="bottom")
 
 
 def expected(moved_m: FloatArray) -> FloatArray:
     """The variogram by the field's definition; its waves are few, so that it is averaged over directions."""
-    found = []
+    semivariances_db2 = []
     for turn in np.linspace(0.0, np.pi, TURNS, endpoint=False):
         along, across = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
         start = moved_m[:, None] * across
         covariance = link_covariance(np.hstack([start, start + LENGTH_M * along]), SHADOWING.correlation_m)
-        found.append(covariance[0, 0] - covariance[0])
-    return SHADOWING.deviation_db**2 * np.mean(found, axis=0)
+        semivariances_db2.append(covariance[0, 0] - covariance[0])
+    return SHADOWING.deviation_db**2 * np.mean(semivariances_db2, axis=0)

@@ -35,16 +35,16 @@ def panels(count: int, height_in: float, widths: tuple[float, ...] | None = None
     return figure, list(row)
 
 
-def say(axes: Any, title: str, x: str, y: str) -> None:
+def set_labels(axes: Any, title: str, x: str, y: str) -> None:
     """The panel's title and the quantities on its axes, with their units."""
     axes.set_title(title, loc="left", fontsize=TEXT_PT, color=INK, pad=6)
     axes.set_xlabel(x, fontsize=SMALL_PT, color=SOFT)
     axes.set_ylabel(y, fontsize=SMALL_PT, color=SOFT)
 
 
-def legend(axes: Any, place: str = "best", **more: Any) -> None:
+def legend(axes: Any, corner: str = "best", **more: Any) -> None:
     """The panel's legend, without a frame."""
-    axes.legend(fontsize=SMALL_PT, labelcolor=SOFT, loc=place, frameon=False, handlelength=1.6, **more)
+    axes.legend(fontsize=SMALL_PT, labelcolor=SOFT, loc=corner, frameon=False, handlelength=1.6, **more)
 
 
 def legend_below(figure: Any, axes: Any, columns: int) -> None:

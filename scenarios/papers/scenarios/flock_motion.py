@@ -94,19 +94,19 @@ def _speed_mps(pairs, velocity, alive, least, most):
             label[pairs[k, 0]], label[pairs[k, 1]] = low, low
         if not changed:
             break
-    found = np.full(arenas, np.nan)
+    means = np.full(arenas, np.nan)
     for arena in range(arenas):
         size, sums = np.zeros(robots), np.zeros((robots, 2))
         for i in range(robots):
             if alive[arena, i]:
-                of = label[arena * robots + i] - arena * robots
-                size[of] += 1
-                sums[of] += velocity[arena, i, :2]
+                robot = label[arena * robots + i] - arena * robots
+                size[robot] += 1
+                sums[robot] += velocity[arena, i, :2]
         total, clusters = 0.0, 0
-        for of in range(robots):
-            if least <= size[of] <= most:
-                total += np.hypot(sums[of, 0], sums[of, 1]) / size[of]
+        for robot in range(robots):
+            if least <= size[robot] <= most:
+                total += np.hypot(sums[robot, 0], sums[robot, 1]) / size[robot]
                 clusters += 1
         if clusters:
-            found[arena] = total / clusters
-    return found
+            means[arena] = total / clusters
+    return means

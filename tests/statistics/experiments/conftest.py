@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.experiments.experiment import Places
+from docs.experiments.experiment import Layout
 from tests.support.deploy.campaign import scenario_in
 
 CAMPAIGN = """
@@ -43,9 +43,9 @@ def numbers(runs):
 
 
 @pytest.fixture
-def folders(tmp_path: Path) -> Places:
+def folders(tmp_path: Path) -> Layout:
     """Those of one experiment, `two-received`, with a page."""
-    created = Places(*(tmp_path / name for name in ("figures", "campaigns", "swept", "data", "pages")))
+    created = Layout(*(tmp_path / name for name in ("figures", "campaigns", "swept", "data", "pages")))
     for folder in (created.figures, created.campaigns, created.pages):
         folder.mkdir()
     (created.figures / "__init__.py").write_text("")

@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from docs.experiments.experiment import HERE, find_experiment
+from docs.experiments.experiment import LAYOUT, find_experiment
 from docs.experiments.figures._consensus_model import graph_of
 from docs.experiments.figures._pso import mean_distances
 from docs.experiments.figures.dense import covered, frozen
@@ -22,7 +22,7 @@ from swarmwire.world.scenario_file import load_scenario
 from tests.support.experiments import mean_direction, mean_order, miniature
 from tests.support.metrics.swarms import said, stand
 
-SCENARIOS: Path = HERE.campaigns / "scenarios"
+SCENARIOS: Path = LAYOUT.campaigns / "scenarios"
 COUNT, SPACING = "robots.flock.count", "robots.flock.place.spacing_m"
 ROCK, PEBBLE = (
     [{"shape": "polygon", "points": [[0, tip], [half, -0.7], [half, 1], [-half, 1], [-half, -0.7]], "at": [0, 0]}]
@@ -161,7 +161,7 @@ def test_dense_pillar_is_subtracted_from_the_area() -> None:
 
 
 def module():
-    return find_experiment("fragmentation", HERE).module
+    return find_experiment("fragmentation", LAYOUT).module
 
 
 def test_fragmentation_is_drawn_and_wide_gaps_split(tmp_path):
@@ -292,7 +292,7 @@ def test_resilience_falls_with_dead_robots_and_is_drawn(tmp_path):
     for campaign, small in (("resilience-coverage", SMALL_FLOOR), ("resilience-search", SMALL_SEARCH)):
         done = miniature("resilience", tmp_path, seeds=3, vary=FEW_RESILIENCE, overrides=small, campaigns=[campaign])
         runs |= done.runs
-    experiment = find_experiment("resilience", HERE)
+    experiment = find_experiment("resilience", LAYOUT)
     assert sorted(runs["resilience-coverage"]["disabled"].unique()) == list(SHARES)
     for reading in experiment.module.READINGS[:4]:
         share, table = experiment.module.efficiency(runs, reading)
@@ -313,7 +313,7 @@ def test_resilience_efficiency_counts_unfinished_runs_at_their_length():
             "sim_time_s": [10.0, 20.0, 20.0, 100.0],
         }
     )
-    module = find_experiment("resilience", HERE).module
+    module = find_experiment("resilience", LAYOUT).module
     reading = module.Reading("search", "resilience-search", "time_s")
     share, table = module.efficiency({"resilience-search": digest}, reading)
     assert share.tolist() == [0.0, 0.5]
@@ -357,7 +357,7 @@ def test_vicsek_correction_for_few_robots_matches_drawn_headings() -> None:
 
 
 def test_vicsek_burn_in_is_listed_for_each_campaign() -> None:
-    experiment = find_experiment("vicsek", HERE)
+    experiment = find_experiment("vicsek", LAYOUT)
     assert set(experiment.module.BURN_IN) == set(experiment.campaigns)
 
 
@@ -394,7 +394,7 @@ def corners(tmp_path_factory) -> Mapping[str, pl.DataFrame]:
     """The digests of all campaigns, 4 seeds at the corners of the maps."""
     digests: dict[str, pl.DataFrame] = {}
     for behaviour, duration_s in DURATION_S.items():
-        names = [name for name in find_experiment("loss-map", HERE).campaigns if f"-{behaviour}" in name]
+        names = [name for name in find_experiment("loss-map", LAYOUT).campaigns if f"-{behaviour}" in name]
         folder = tmp_path_factory.mktemp(behaviour)
         over = [f"duration_s={duration_s}"]
         digests |= miniature("loss-map", folder, seeds=4, vary=CORNERS, overrides=over, campaigns=names).runs
@@ -423,7 +423,7 @@ def test_loss_map_radios_lose_equally_in_the_mean(corners):
 
 
 def test_loss_map_is_drawn_with_all_cells(corners):
-    experiment = find_experiment("loss-map", HERE)
+    experiment = find_experiment("loss-map", LAYOUT)
     assert len(experiment.draw(corners).axes) == 7  # with the scale
     lines = experiment.numbers(corners).splitlines()
     assert sum(line.startswith("| flocking | ") for line in lines) == 5  # four corners, and the whole map
@@ -440,6 +440,6 @@ def test_loss_map_is_drawn_with_all_cells(corners):
     ],
 )
 def test_loss_map_flock_is_aligned_and_together(poses, flock):
-    scenario = load_scenario(HERE.campaigns / "scenarios" / "loss-map-flocking.toml")
+    scenario = load_scenario(LAYOUT.campaigns / "scenarios" / "loss-map-flocking.toml")
     (metric,) = selected_metrics(scenario).metrics
     assert said(metric, stand(*poses)) == [pytest.approx(flock, abs=1e-9)]

@@ -8,7 +8,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from docs.experiments.__main__ import app
-from docs.experiments.experiment import HERE, find_experiment, names
+from docs.experiments.experiment import LAYOUT, find_experiment, names
 from docs.experiments.making import digest, digests, draw, run, run_app
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.sweep import ExecutionOptions
@@ -142,4 +142,4 @@ def test_experiment_commands_have_help_and_list():
     assert all(command in numbers for command in ("list", "draw", "digest", "run"))
     assert "--seeds" in runner.invoke(app, ["run", "--help"], env={"NO_COLOR": "1"}).output
     listed = runner.invoke(app, ["list"]).output
-    assert all(f"{name}: " in listed for name in names(HERE))
+    assert all(f"{name}: " in listed for name in names(LAYOUT))
