@@ -3,7 +3,7 @@
 The functions of `math` and numpy are those of the machine's C library and vector units, whose last bits differ. What a
 run computes uses these: of a float they return a float, of an array of float64 an array. `compiled` has them for
 compiled code, `trigonometric` and `exponential` define each once. Errors are at most 1 ulp for sin, cos, exp and log,
-and 2 for the others (4 for erfc).
+and 2 for the others.
 """
 
 import math

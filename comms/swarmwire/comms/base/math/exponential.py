@@ -130,16 +130,21 @@ def define_exponential(operations: Operations) -> Exponential:  # noqa: PLR0915 
         return t * ((EXP[0] + t * EXP[1]) + w * ((EXP[2] + t * EXP[3]) + w * EXP[4]))
 
     @formula
-    def exp(x: Number) -> Number:
+    def exp_of_sum(x: Number, rest: Number) -> Number:
+        """Return e^(x + rest), where rest is at most the rounding error of x."""
         is_inside = (x <= MAX_EXP) & (x >= MIN_EXP)
         inside = where(is_inside, x, 0.0)
         k, n = round_(inside * INVERSE_LN2)
-        high, low = inside - k * LN2_HIGH, k * LN2_LOW
+        high, low = inside - k * LN2_HIGH, k * LN2_LOW - rest
         r = high - low
         t = r * r
         c = r - exp_series(t)
         y = scale(1.0 - ((low - (r * c) / (2.0 - c)) - high), n)
         return where(is_inside, y, where(x > 0.0, INF, where(x < 0.0, 0.0, NAN)))
+
+    @formula
+    def exp(x: Number) -> Number:
+        return exp_of_sum(x, 0.0)
 
     @formula
     def expm1(x: Number) -> Number:
@@ -317,7 +322,7 @@ def define_exponential(operations: Operations) -> Exponential:  # noqa: PLR0915 
         # up to 0.84375
         near = where(size < 0.84375, x, 0.0)
         r = near * ratio_of_series(near * near, ERFC_1)
-        first = where(x < 0.25, 1.0 - (near + r), 0.5 - (r + (near - 0.5)))
+        first = where(near < 0.5, 1.0 - (near + r), (1.0 - near) - r)
         # up to 1.25
         middle = ratio_of_series(where(size < 1.25, size, 1.0) - 1.0, ERFC_2)
         second = where(x < 0.0, 1.0 + (ERX + middle), (1.0 - ERX) - middle)
@@ -326,7 +331,9 @@ def define_exponential(operations: Operations) -> Exponential:  # noqa: PLR0915 
         s = 1.0 / (far * far)
         series = where(far < 1.0 / 0.35, ratio_of_series(s, ERFC_3), ratio_of_series(s, ERFC_4))
         z = high_word(far)
-        tail = exp(-z * z - 0.5625) * exp((z - far) * (z + far) + series) / far
+        square, rest = -z * z - 0.5625, (z - far) * (z + far) + series  # the square is exact
+        exponent = square + rest
+        tail = exp_of_sum(exponent, (square - exponent) + rest) / far
         third = where(x < 0.0, where(x < -6.0, 2.0, 2.0 - tail), where(x < 28.0, tail, 0.0))
         y = where(size < 0.84375, first, where(size < 1.25, second, third))
         return where(abs(x) <= INF, y, NAN)
