@@ -47,10 +47,7 @@ PRIVATE_NAMES = {
         *("_cache", "_compile_for_args", "_compiler", "add_overload"),
         *("get_call_template", "get_overload", "overloads", "py_func", "targetoptions"),
     ),
-    "FunctionCache": (
-        *("_cache_file", "_cache_path", "_index_key", "_py_func", "flush", "load_overload", "save_overload"),
-    ),
-    "IndexDataCacheFile": ("_source_stamp",),
+    "FunctionCache": (*("_cache_path", "_index_key", "_py_func", "flush", "load_overload", "save_overload"),),
     "BaseNamedTuple": ("fields", "types"),
     "options": ("_nrt", "forceinline", "no_cfunc_wrapper", "no_cpython_wrapper"),
 }
@@ -161,8 +158,6 @@ def _refuse_python(compiled: Any) -> Any:
 class _Cache(FunctionCache):
     """The cache of one compiled function; its entries are dropped once anything that the function uses has changed."""
 
-    _has_digest = False
-
     def __init__(self, function: Callable[..., Any], options: dict[str, Any], *, is_inner: bool = False) -> None:
         """`is_inner`: the version that compiled code calls, without the CPython wrapper."""
         super().__init__(function)
@@ -170,7 +165,6 @@ class _Cache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the machine code for a signature; None if there is none that is up to date."""
-        self._add_digest()
         with self._locked():
             try:
                 return super().load_overload(sig, target_context)
@@ -180,7 +174,6 @@ class _Cache(FunctionCache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save the machine code of a signature."""
-        self._add_digest()
         with self._locked():
             super().save_overload(sig, data)
 
@@ -202,15 +195,10 @@ class _Cache(FunctionCache):
             fcntl.flock(lock, fcntl.LOCK_EX)
             yield
 
-    def _add_digest(self) -> None:
-        """Add the digest to the stamp at the first call: before, the function's module may not be complete."""
-        if not self._has_digest:
-            self._has_digest = True
-            file: Any = self._cache_file
-            file._source_stamp = file._source_stamp, repr(self._options), digest_of(self._py_func)
-
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        return super()._index_key(sig, codegen), tuple(_tuple_fields(kind) for kind in sig), self._is_inner
+        """Return all that machine code depends on. numba's own key of a closure is another one in each process."""
+        fields = tuple(_tuple_fields(kind) for kind in sig)
+        return sig, codegen.magic_tuple(), digest_of(self._py_func), repr(self._options), fields, self._is_inner
 
 
 def _tuple_fields(kind: Any) -> Any:
@@ -221,7 +209,10 @@ def _tuple_fields(kind: Any) -> Any:
 
 
 def digest_of(function: Callable[..., Any]) -> str:
-    """SHA-256 of a function's code, and of all constants and compiled functions that it uses, directly or not."""
+    """SHA-256 of a function's code, and of all constants and compiled functions that it uses, directly or not.
+
+    It is computed at the first call: before, the function's module may not be complete.
+    """
     digests, waiting = dict[Any, bytes](), [function]
     while waiting:
         if (current := waiting.pop()) not in digests:

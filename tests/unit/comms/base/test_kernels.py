@@ -30,6 +30,15 @@ SHIFT = 1.0
 def plain(x):
     return doubled(x) + DEEP + other.FAR + SHIFT
 
+def adding(function):
+    @njit()
+    def added(x):
+        return function(x) + SHIFT
+
+    return added
+
+within = adding(doubled)
+
 @kernel(from_python=True)
 def first(pair):
     return pair.a
@@ -87,11 +96,19 @@ def hits(compiled) -> int:
 
 
 @needs_compiler
-def test_machine_code_is_reused(modules):
-    assert modules.imported().plain(1.0) == 113.0
-    again = modules.imported()
-    assert again.plain(1.0) == 113.0
-    assert hits(again.plain) == 1
+@pytest.mark.parametrize(("name", "result"), [("plain", 113.0), ("within", 3.0)])
+def test_machine_code_is_reused(modules, name, result):
+    for expected_hits in (0, 1):
+        compiled = getattr(modules.imported(), name)
+        assert compiled(1.0) == result
+        assert hits(compiled) == expected_hits
+
+
+@needs_compiler
+def test_closure_is_compiled_again_for_another_function(modules):
+    assert modules.imported().within(1.0) == 3.0
+    modules.other = OTHER.replace("return FACTOR * x", "return FACTOR * x + 1.0")
+    assert modules.imported().within(1.0) == 4.0
 
 
 @needs_compiler
@@ -223,7 +240,6 @@ def test_numba_has_all_private_names() -> None:
     owners = {
         "Dispatcher": compiled,
         "FunctionCache": cache,
-        "IndexDataCacheFile": cache._cache_file,
         "BaseNamedTuple": types.NamedTuple((types.int64,), Single),
         "options": CPUTargetOptions,
     }

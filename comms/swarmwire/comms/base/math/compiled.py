@@ -71,17 +71,21 @@ def log_gamma(x: float):
     return (x - 0.5) * log(x) - x + HALF_LOG_2_PI + series / x - log(product)
 
 
+def _loop_of(function: Any, loop: Any) -> Any:
+    """Compile the loop of a function under its own name: machine code knows functions by their names."""
+    loop.__qualname__ = f"loop_of_{function.__name__}"
+    return _formula(loop)
+
+
 def _unary_loop(function: Any) -> Any:
-    @_formula
     def loop(x: Any, out: Any):
         for i in range(len(x)):
             out[i] = function(x[i])
 
-    return loop
+    return _loop_of(function, loop)
 
 
 def _angle_loop(near_function: Any, function: Any) -> Any:
-    @_formula
     def loop(x: Any, out: Any):
         are_near = True
         for i in range(len(x)):
@@ -91,7 +95,7 @@ def _angle_loop(near_function: Any, function: Any) -> Any:
             for i in range(len(x)):
                 out[i] = function(x[i])
 
-    return loop
+    return _loop_of(near_function, loop)
 
 
 @_formula
@@ -112,12 +116,11 @@ def _weighted_sum(rows: Any, weights: Any, out: Any):
 
 
 def _binary_loop(function: Any) -> Any:
-    @_formula
     def loop(x: Any, y: Any, out: Any):
         for i in range(len(x)):
             out[i] = function(x[i], y[i])
 
-    return loop
+    return _loop_of(function, loop)
 
 
 COMPILED.update({name: _unary_loop(globals()[name]) for name in UNARY})
