@@ -70,9 +70,11 @@ def _find_kinds(kind, power_mw, counts, antenna_gains, pairs, is_symmetric, send
     send, receive = antenna_gains  # ratios
     for r in range(len(send)):
         send[r], receive[r] = from_db(send_dbm[r]), from_db(receive_dbi[r])
+    for i in range(len(a)):  # a loop of its own is vectorised
+        power_mw[0, i] = from_db(-forward_db[i]) * gain[i]
     for i in range(len(a)):
         s, r = np.uint64(a[i]), np.uint64(b[i])
-        forward_mw = reverse_mw = from_db(-forward_db[i]) * gain[i]
+        forward_mw = reverse_mw = power_mw[0, i]
         if not is_symmetric:
             reverse_mw = from_db(-reverse_db[i]) * gain[i]
         forward_mw *= send[s] * receive[r]

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray, Table
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, UNDER_WAY
@@ -61,21 +60,17 @@ class Reporter:
         packets.reserve(len(queued), int(queued.queued.used[1]))
         links.reserve(int(buffer.count[0]) + len(queued))
         first_packet, first_link = len(packets), len(links)
-        row_of = append_results(
+        pose_id = append_results(
             *(queued.queued.table, queued.queued.data, queued.table, buffer, is_intended),
             *(packets.table, packets.data, packets.used, links.table, links.used),
         )
-        with np.errstate(divide="ignore"):
-            links.rows["rssi_dbm"][first_link : first_link + len(row_of)] = 10.0 * portable.log10(
-                buffer.power_mw[row_of]
-            )
         new = packets.rows[first_packet:]
         if np.count_nonzero(new["fate"] != UNDER_WAY):
-            links.rows["in_range"][first_link + len(row_of) :] = self._count_in_range(new, liveness)
-        pose_id = buffer.pose_id[row_of]
-        for number in np.unique(pose_id).tolist():
+            links.rows["in_range"][first_link + len(pose_id) :] = self._count_in_range(new, liveness)
+        for number, pose in poses.items():
             index = first_link + np.flatnonzero(pose_id == number)
-            pass_received(index, links.table, packets.table, poses[number], self._keys, self._stages)
+            if len(index):
+                pass_received(index, links.table, packets.table, pose, self._keys, self._stages)
 
     def _count_in_range(self, packets: Table, liveness: LivenessHistory) -> IntArray:
         """Return the receivers in range of packets that never went on air, (packets,); 0 for the others."""

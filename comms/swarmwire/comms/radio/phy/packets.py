@@ -13,6 +13,7 @@ from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_PACKET, NO_ROBO
 from swarmwire.comms.radio.config.radio import Radio, airtime_ns
 from swarmwire.comms.radio.links import fill_remainder
 from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET
+from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import (
     DECIDED,
@@ -172,7 +173,7 @@ def append_results(
     links: Any,
     link_used: Any,
 ):
-    """Append the packets with result rows, or done since, and the links of these rows; return the rows, (links,).
+    """Append the packets with result rows, or done since, and the links of these rows; return their poses, (links,).
 
     `queued` and `queued_data` are the packets in the order of the rows of `packet`, and their payloads; `rows` is a
     `ResultBuffer`; `is_intended` selects its rows with an intended receiver, all if it is empty. The tables `packets`
@@ -202,7 +203,7 @@ def append_results(
             size += reported.size_bytes
             used[0] += 1
     used[1] = size
-    remaining, row_of = np.empty(used[0] - first, np.int64), np.empty(rows.count[0], np.int64)
+    remaining, pose_id = np.empty(used[0] - first, np.int64), np.empty(rows.count[0], np.int64)
     for p in range(len(remaining)):
         remaining[p] = packets[first + p].intended
     i = link_used[0]
@@ -212,11 +213,11 @@ def append_results(
             remaining[p - first] -= 1
             link.packet, link.sender, link.receiver, link.receiver_count = p, packets[p].sender, receiver[k], 1
             link.in_range, link.fate, link.final_at_ns = rows.in_range[k], rows.fate[k], rows.final_at_ns[k]
-            row_of[i - link_used[0]] = k
+            link.rssi_dbm, pose_id[i - link_used[0]] = to_db(rows.power_mw[k]), rows.pose_id[k]
             i += 1
     count = i - link_used[0]
     for p in range(first, used[0]):
         fill_remainder(links[i], packets[p], p, remaining[p - first], 0)
         i += 1
     link_used[0] = i
-    return row_of[:count]
+    return pose_id[:count]

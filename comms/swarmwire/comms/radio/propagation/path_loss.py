@@ -25,9 +25,10 @@ def loss_db(curve: Any, distance_m: Any):
     """Return the path loss over a distance in m, in dB."""
     distance_m = max(distance_m, NEAREST_M)
     absorbed_db = curve.absorption_db_per_m * distance_m
-    if distance_m <= curve.break_m:
-        return curve.near_db + curve.near_slope_db * math_compiled.log10(distance_m) + absorbed_db
-    return curve.far_db + curve.far_slope_db * math_compiled.log10(distance_m) + absorbed_db
+    is_near = distance_m <= curve.break_m
+    at_1_m_db = curve.near_db if is_near else curve.far_db
+    slope_db = curve.near_slope_db if is_near else curve.far_slope_db
+    return at_1_m_db + slope_db * math_compiled.log10(distance_m) + absorbed_db
 
 
 @njit()
