@@ -156,7 +156,7 @@ def _refuse_python(compiled: Any) -> Any:
 
 
 class _Cache(FunctionCache):
-    """The cache of one compiled function; its entries are dropped once anything that the function uses has changed."""
+    """The cache of one compiled function; its entries are not used once anything that the function uses has changed."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any], *, is_inner: bool = False) -> None:
         """`is_inner`: the version that compiled code calls, without the CPython wrapper."""
