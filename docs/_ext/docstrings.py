@@ -40,7 +40,7 @@ def _prepare(_app: Sphinx, object_type: str, name: str, _object: Any, _options: 
     if object_type == "module":
         lines.clear()
     elif lines and any(lines):
-        lines[:] = GoogleDocstring([_escaped(line) for line in lines], object_type="method").lines()
+        lines[:] = GoogleDocstring([_escaped(line) for line in lines], what="method").lines()
     elif object_type == "attribute":
         lines[:] = [_escaped(_help_of(name))]
 
