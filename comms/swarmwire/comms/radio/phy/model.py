@@ -67,7 +67,7 @@ class Reporter:
         new = packets.rows[first_packet:]
         if np.count_nonzero(new["fate"] != UNDER_WAY):
             links.rows["in_range"][first_link + len(pose_id) :] = self._count_in_range(new, liveness)
-        for number, pose in poses.items():
+        for number, pose in poses.items() if self._stages.has_any else ():
             index = first_link + np.flatnonzero(pose_id == number)
             if len(index):
                 pass_received(index, links.table, packets.table, pose, self._keys, self._stages)

@@ -112,6 +112,7 @@ class StagesAfter(NamedTuple):
 
     params: Table  # one record of type PARAMS
     trace_delay: TraceDelayParams | None
+    has_any: bool
 
 
 def stages_after(context: ChannelContext) -> StagesAfter:
@@ -128,7 +129,7 @@ def stages_after(context: ChannelContext) -> StagesAfter:
             trace_delay = stage.params
         else:
             stage.write(record[stage.name])
-    return StagesAfter(params, trace_delay)
+    return StagesAfter(params, trace_delay, bool(stages))
 
 
 @kernel()
