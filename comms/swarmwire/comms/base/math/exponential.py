@@ -130,12 +130,12 @@ def define_exponential(operations: Operations) -> Exponential:  # noqa: PLR0915 
         return t * ((EXP[0] + t * EXP[1]) + w * ((EXP[2] + t * EXP[3]) + w * EXP[4]))
 
     @formula
-    def exp_of_sum(x: Number, rest: Number) -> Number:
-        """Return e^(x + rest), where rest is at most the rounding error of x."""
+    def exp_of_sum(x: Number, remainder: Number) -> Number:
+        """Return e^(x + remainder), where remainder is at most the rounding error of x."""
         is_inside = (x <= MAX_EXP) & (x >= MIN_EXP)
         inside = where(is_inside, x, 0.0)
         k, n = round_(inside * INVERSE_LN2)
-        high, low = inside - k * LN2_HIGH, k * LN2_LOW - rest
+        high, low = inside - k * LN2_HIGH, k * LN2_LOW - remainder
         r = high - low
         t = r * r
         c = r - exp_series(t)
@@ -331,9 +331,9 @@ def define_exponential(operations: Operations) -> Exponential:  # noqa: PLR0915 
         s = 1.0 / (far * far)
         series = where(far < 1.0 / 0.35, ratio_of_series(s, ERFC_3), ratio_of_series(s, ERFC_4))
         z = high_word(far)
-        square, rest = -z * z - 0.5625, (z - far) * (z + far) + series  # the square is exact
-        exponent = square + rest
-        tail = exp_of_sum(exponent, (square - exponent) + rest) / far
+        square, remainder = -z * z - 0.5625, (z - far) * (z + far) + series  # the square is exact
+        exponent = square + remainder
+        tail = exp_of_sum(exponent, (square - exponent) + remainder) / far
         third = where(x < 0.0, where(x < -6.0, 2.0, 2.0 - tail), where(x < 28.0, tail, 0.0))
         y = where(size < 0.84375, first, where(size < 1.25, second, third))
         return where(abs(x) <= INF, y, NAN)
