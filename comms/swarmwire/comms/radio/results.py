@@ -68,7 +68,9 @@ def _counting_sort(order, key, keys):
 @njit()
 def _time_bins(at_ns):
     """Return the time bin of each row, for about as many bins of equal width as rows; and the number of bins."""
-    first_ns, last_ns, shift = at_ns.min(), at_ns.max(), 0
+    first_ns, last_ns, shift = at_ns[0], at_ns[0], 0
+    for time_ns in at_ns:  # min() and max() of numba take a second to compile
+        first_ns, last_ns = min(first_ns, time_ns), max(last_ns, time_ns)
     while (last_ns - first_ns) >> shift > len(at_ns):
         shift += 1
     return (at_ns - first_ns) >> shift, ((last_ns - first_ns) >> shift) + 1

@@ -124,7 +124,8 @@ def place_robots(
                 break
         if not is_free:
             return robot
-        occupancy.robot[robot] = x, y, disc.radius_m, disc.bottom_m, disc.top_m
+        for column, value in enumerate((x, y, disc.radius_m, disc.bottom_m, disc.top_m)):
+            occupancy.robot[robot, column] = value
         cell = row_of(occupancy.cells, y) * occupancy.cells.nx + column_of(occupancy.cells, x)
         occupancy.next_robot[robot] = occupancy.head[cell]
         occupancy.head[cell] = robot

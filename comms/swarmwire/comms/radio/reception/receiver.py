@@ -125,7 +125,7 @@ def sinr_for_db(receiver: Receiver, success: float, bits: int) -> float:
     low, high = MIN_DB, MAX_DB
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        if chunk_success(receiver, from_db(middle), bits) >= success:
+        if chunk_success(receiver, from_db(middle), float(bits)) >= success:
             high = middle
         else:
             low = middle

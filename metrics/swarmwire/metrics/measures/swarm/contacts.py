@@ -144,9 +144,9 @@ def smallest_gap_m(
                 n += 1
         listed = n
         if wrap_m[0] > 0.0:
-            x[n : 2 * n], y[n : 2 * n] = x[:n] + wrap_m[0], y[:n]
-            radius[n : 2 * n], robot[n : 2 * n] = radius[:n], robot[:n]
             listed = 2 * n
+            for k in range(n):  # an assignment of slices takes 3 s to compile, for its error's text
+                x[n + k], y[n + k], radius[n + k], robot[n + k] = x[k] + wrap_m[0], y[k], radius[k], robot[k]
         smallest_m = np.inf
         for a in range(n):
             for b in range(a + 1, min(a + n, listed)):
