@@ -65,10 +65,13 @@ def test_request_to_a_run_loads_no_simulator(arguments):
     assert "swarmwire.deploy.runs.simulation" not in modules
 
 
-def test_view_loads_the_viewer_without_the_physics():
-    modules = loaded_by('call("view", "nowhere")')
-    assert "swarmwire.deploy.cli.actions.view" in modules
-    assert not modules & {"matplotlib", "pymunk", "swarmwire.deploy.runs.simulation", "swarmwire.world.world"}
+def test_view_of_a_recording_loads_no_simulator(tmp_path):
+    recording = tmp_path / "cut.rrd"
+    recording.write_bytes(b"RRF2" + bytes(9))
+    modules = loaded_by(f'call("view", "{recording}", "--web")')
+    assert "swarmwire.deploy.live.viewer" in modules
+    assert not modules & (set(SIMULATOR) - {"numpy", "zenoh"})
+    assert not modules & {"swarmwire.deploy.runs.simulation", "swarmwire.world.world"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -13,10 +13,11 @@ import pytest
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy import run
 from swarmwire.deploy.live import live_view, viewer
+from swarmwire.deploy.live.drawing import Drawer
 from swarmwire.deploy.live.live_view import LiveView
 from swarmwire.deploy.live.page.web_viewer import viewer_code
 from swarmwire.deploy.live.subscription import subscribe
-from swarmwire.deploy.live.viewer import Drawer, Viewer, ViewOptions, readable, show_recording
+from swarmwire.deploy.live.viewer import Viewer, ViewOptions, readable, show_recording
 from swarmwire.deploy.runs.live_address import read_live
 from swarmwire.deploy.runs.published import Published
 from swarmwire.metrics.measures.measure import Metrics

@@ -10,8 +10,8 @@ import polars as pl
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Group, Light, Static
 from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.metrics.measures.metric import MetricInfo
 from swarmwire.metrics.pictures.drawing.film import Film
-from swarmwire.metrics.records.run_folder.layout import MetricInfo
 
 OBSTACLES = (
     Obstacle("cylinder", 2.0, 2.0, radius_m=0.4),

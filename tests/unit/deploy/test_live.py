@@ -11,7 +11,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.deploy.cli.view import view_command
 from swarmwire.deploy.live import viewer
-from swarmwire.deploy.live.viewer import CarriedRounding
+from swarmwire.deploy.live.drawing import CarriedRounding
 from swarmwire.deploy.runs.published import PendingTicks, Sampling
 from tests.support.metrics.truths import edges, finished, static, tally, truth
 from tests.support.refusals import refused_input

@@ -10,7 +10,7 @@ import pytest
 
 from swarmwire.comms.base.errors import BadInput, CustomCodeFailed
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.measures.metric import Metric
+from swarmwire.metrics.measures.metric import Metric, metric_info
 from swarmwire.metrics.measures.registry import (
     ENTRY_POINT_GROUP,
     METRICS,
@@ -21,7 +21,6 @@ from swarmwire.metrics.measures.registry import (
     select_metrics,
     standard_names,
 )
-from swarmwire.metrics.records.run_folder.layout import metric_info
 from tests.support.custom_code import CODE, install
 from tests.support.metrics.truths import static, truth
 

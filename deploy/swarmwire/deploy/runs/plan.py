@@ -36,8 +36,7 @@ from swarmwire.deploy.runs.scenario_parts import (
     stop_conditions,
 )
 from swarmwire.metrics.measures.measure import Condition
-from swarmwire.metrics.measures.metric import Metric
-from swarmwire.metrics.records.run_folder.layout import metric_info
+from swarmwire.metrics.measures.metric import Metric, metric_info
 from swarmwire.world.scenario.bodies import bodies_of, custom_code
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World

@@ -4,9 +4,10 @@ Each measure reads the view of one tick: the truth, and values that several metr
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import isinf
 from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -241,3 +242,30 @@ def neighbours_of(edges: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
             other[following[node]] = edges[e, 1 - end]
             following[node] += 1
     return start, other
+
+
+@dataclass(frozen=True)
+class MetricInfo:
+    """A metric that a run measured."""
+
+    name: str
+    help: str  #: one line: formula and unit
+    unit: str
+    kind: str  #: "level", "count" or "time"
+    bounds: tuple[float | None, float | None]  #: least and largest value of a tick; None: there is none
+
+
+def metric_info(metric: Metric | type[Metric]) -> MetricInfo:
+    """Return the entry of a metric in run.json."""
+    least, largest = (None if bound is None or isinf(bound) else float(bound) for bound in metric.bounds)
+    return MetricInfo(metric.name, metric.help, metric.unit, metric.kind, (least, largest))
+
+
+def metric_infos(started: Mapping[str, Any]) -> tuple[MetricInfo, ...]:
+    """Return the metrics that `run.json` lists; KeyError, TypeError or ValueError if the list is malformed."""
+    return tuple(_info(item) for item in started["metrics"])
+
+
+def _info(item: Any) -> MetricInfo:
+    least, largest = item["bounds"]
+    return MetricInfo(item["name"], item["help"], item["unit"], item["kind"], (least, largest))

@@ -12,12 +12,12 @@ from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Group, Static
 from swarmwire.comms.robot.bodies.body import load_body
+from swarmwire.metrics.measures.metric import MetricInfo
 from swarmwire.metrics.pictures.drawing.animation import FilmFigure, write_gif, write_mp4
 from swarmwire.metrics.pictures.drawing.canvas import DEAD, OTHER_STATE, STATE_COLORS, robot_color, shade
 from swarmwire.metrics.pictures.drawing.film import NO_STATE, Film
 from swarmwire.metrics.pictures.drawing.scenario import _facts
 from swarmwire.metrics.pictures.drawing.swarm import in_range
-from swarmwire.metrics.records.run_folder.layout import MetricInfo
 from tests.support.comms.lines import indexed
 from tests.support.metrics.films import LIGHT, OBSTACLES, film, two_groups
 

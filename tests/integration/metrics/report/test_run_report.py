@@ -10,6 +10,7 @@ import pytest
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate
+from swarmwire.metrics.measures.metric import MetricInfo
 from swarmwire.metrics.measures.network.latency import Latencies
 from swarmwire.metrics.pictures.report import run_timeline
 from swarmwire.metrics.pictures.report.page import Listing, ReportTable, blank_figure, svg_of
@@ -24,7 +25,6 @@ from swarmwire.metrics.pictures.report.run_radio import (
     receivers_act_at_ns,
 )
 from swarmwire.metrics.pictures.report.run_timeline import Curve, timeline
-from swarmwire.metrics.records.run_folder.layout import MetricInfo
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.statistics.bootstrap import binomial_interval
 from swarmwire.metrics.text import number

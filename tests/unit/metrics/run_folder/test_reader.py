@@ -16,10 +16,10 @@ from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import EventRecord, Group, Light, Static
 from swarmwire.comms.robot.bodies.body import body_from, body_names, load_body
+from swarmwire.metrics.measures.metric import MetricInfo, metric_info
 from swarmwire.metrics.measures.registry import METRICS, standard_names
 from swarmwire.metrics.pictures.drawing.metrics_strip import is_count, limits, titled
 from swarmwire.metrics.records.run_folder import reader, tables, ticks, writer
-from swarmwire.metrics.records.run_folder.layout import MetricInfo, metric_info
 from swarmwire.metrics.records.run_folder.reader import SUMMARY_KINDS, RunFolder
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.tables import TABLES, read_static, write_static

@@ -6,11 +6,8 @@ from pathlib import Path
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.extras import UI
-from swarmwire.deploy.cli.actions.control import operator_network
 from swarmwire.deploy.cli.options import RunChoice, standard_input_closed
-from swarmwire.deploy.live.remote_control import only_run_at
-from swarmwire.deploy.live.subscription import RunGone
-from swarmwire.deploy.live.viewer import ViewOptions, has_screen, show_live, show_recording
+from swarmwire.deploy.live.viewer import ViewOptions, has_screen, show_recording
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.live_address import Live, find_run, read_live
 from swarmwire.deploy.terminal.output import echo
@@ -30,7 +27,9 @@ def view_run(run: Path, *, web: bool, port: int | None, with_parent: bool) -> No
 
 def open_page(choice: RunChoice, *, port: int | None, with_parent: bool) -> None:
     """Serve the page of a live run until it is over and closed."""
+    from swarmwire.deploy.cli.actions.control import operator_network
     from swarmwire.deploy.live.page.server import show_page  # needs the extra [ui]
+    from swarmwire.deploy.live.remote_control import only_run_at
 
     network = operator_network(choice)
     if choice.endpoint is None:
@@ -58,6 +57,9 @@ def _show(run: Path, options: ViewOptions) -> None:
     live = read_live(run) if run.is_dir() else None
     recording = run / RECORDING if run.is_dir() else run
     if live is not None:
+        from swarmwire.deploy.live.drawing import show_live
+        from swarmwire.deploy.live.subscription import RunGone
+
         try:
             show_live(live, options)
         except RunGone:

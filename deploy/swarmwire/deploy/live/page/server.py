@@ -19,11 +19,12 @@ from starlette.types import ASGIApp
 from swarmwire.comms.base.config import check_plain
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.wire.network import Network
+from swarmwire.deploy.live.drawing import Drawer
 from swarmwire.deploy.live.page.news import NewsThread, TickNumbers, facts
 from swarmwire.deploy.live.page.serving import RequestGuard, serving
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.live.subscription import subscribe
-from swarmwire.deploy.live.viewer import AbandonmentDetector, Drawer, ViewOptions, has_screen
+from swarmwire.deploy.live.viewer import AbandonmentDetector, ViewOptions, has_screen
 from swarmwire.deploy.runs.live_address import Live
 
 MAX_STEPS = 100_000

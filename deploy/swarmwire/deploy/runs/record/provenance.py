@@ -30,7 +30,8 @@ from swarmwire.comms.base.config import folder_of, from_toml, read_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import ONNX, file_of, resolve, with_file
 from swarmwire.deploy.runs.scenario_parts import trace_path
-from swarmwire.metrics.records.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, CopiedFile, MetricInfo
+from swarmwire.metrics.measures.metric import MetricInfo
+from swarmwire.metrics.records.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, CopiedFile
 from swarmwire.world.placement.maps import path_near_scenario
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario, mapping_of

@@ -10,8 +10,9 @@ from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArra
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Static
+from swarmwire.metrics.measures.metric import MetricInfo
 from swarmwire.metrics.measures.registry import LINK_PDR
-from swarmwire.metrics.records.run_folder.layout import MOVABLE, MetricInfo
+from swarmwire.metrics.records.run_folder.layout import MOVABLE
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 
 NO_STATE = -1

@@ -8,6 +8,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.metrics.measures.metric import MetricInfo, metric_info
 from swarmwire.metrics.measures.registry import LINK_PDR, METRICS
 from swarmwire.metrics.pictures.drawing.canvas import (
     CURVE,
@@ -21,7 +22,6 @@ from swarmwire.metrics.pictures.drawing.canvas import (
     plain_axes,
 )
 from swarmwire.metrics.pictures.drawing.film import Film
-from swarmwire.metrics.records.run_folder.layout import MetricInfo, metric_info
 
 Facts = Mapping[str, MetricInfo]
 UNKNOWN: Facts = {}

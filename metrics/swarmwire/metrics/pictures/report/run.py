@@ -8,6 +8,7 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.observe.truth import Static
+from swarmwire.metrics.measures.metric import MetricInfo
 from swarmwire.metrics.measures.registry import LINK_PDR
 from swarmwire.metrics.pictures.drawing.film import Film
 from swarmwire.metrics.pictures.drawing.metrics_strip import info_of, is_count
@@ -15,7 +16,6 @@ from swarmwire.metrics.pictures.report.page import Listing, Part, Report, Report
 from swarmwire.metrics.pictures.report.run_data import RunData, read_run
 from swarmwire.metrics.pictures.report.run_radio import RADIO, REAL_TIME
 from swarmwire.metrics.pictures.report.run_timeline import EVENTS
-from swarmwire.metrics.records.run_folder.layout import MetricInfo
 from swarmwire.metrics.text import counted, number, share
 
 _MAX_LINES = 300  # lines of the scenario

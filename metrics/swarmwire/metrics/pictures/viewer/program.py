@@ -5,8 +5,10 @@ import secrets
 import socket
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+
+Target = str | Callable[[bytes], None]  # address of rerun's program, or a receiver of the recording's bytes
 
 TERMINATE_TIMEOUT_S = 5.0
 # Linux kills a process with its parent after prctl(PR_SET_PDEATHSIG, SIGKILL); if the parent is dead, exit at once.

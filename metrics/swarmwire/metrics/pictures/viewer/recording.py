@@ -1,7 +1,6 @@
 """Recordings for rerun's viewer: an arena and its metrics over time, in a file or sent to a viewer."""
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.metrics.measures.measure import MetricValues
+from swarmwire.metrics.pictures.viewer.program import Target
 from swarmwire.metrics.pictures.viewer.rows import RerunRows
 from swarmwire.metrics.pictures.viewer.selection import ARENA, selected_robot
 from swarmwire.metrics.records.run_folder.events import changed_names
@@ -129,9 +129,6 @@ class RerunRecording(Observer):
             finally:
                 self._rec.disconnect()
         return {"record_rrd": {"rows": self._ticks, "dropped": 0}}
-
-
-Target = str | Callable[[bytes], None]  # address of rerun's program, or a receiver of the recording's bytes
 
 
 class RerunLive(RerunRecording):

@@ -1,14 +1,10 @@
-"""Names and formats of the files of a run folder, the columns of `ticks`, the metrics in run.json, and the log."""
+"""Names and formats of the files of a run folder, the columns of `ticks`, the blocks of the recording, and the log."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isinf
 from pathlib import Path
-from typing import Any
 
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.printable import LINES, printable
-from swarmwire.metrics.measures.metric import Metric
 
 SUMMARY = "summary.json"  # written last; its presence means that the run is over
 RUN_JSON = "run.json"  # provenance of the run, written first
@@ -49,31 +45,21 @@ class CopiedFile:
     what: str
 
 
-@dataclass(frozen=True)
-class MetricInfo:
-    """A metric that a run measured."""
-
-    name: str
-    help: str  #: one line: formula and unit
-    unit: str
-    kind: str  #: "level", "count" or "time"
-    bounds: tuple[float | None, float | None]  #: least and largest value of a tick; None: there is none
+FILE_HEADER_BYTES = 12  # magic, version and options of a .rrd
+FRAME_HEADER_BYTES = 16  # kind, and the payload's length in the last 8, little-endian
 
 
-def metric_info(metric: Metric | type[Metric]) -> MetricInfo:
-    """Return the entry of a metric in run.json."""
-    least, largest = (None if bound is None or isinf(bound) else float(bound) for bound in metric.bounds)
-    return MetricInfo(metric.name, metric.help, metric.unit, metric.kind, (least, largest))
-
-
-def metric_infos(started: Mapping[str, Any]) -> tuple[MetricInfo, ...]:
-    """Return the metrics that `run.json` lists; KeyError, TypeError or ValueError if the list is malformed."""
-    return tuple(_info(item) for item in started["metrics"])
-
-
-def _info(item: Any) -> MetricInfo:
-    least, largest = item["bounds"]
-    return MetricInfo(item["name"], item["help"], item["unit"], item["kind"], (least, largest))
+def complete_frames_bytes(path: Path) -> int:
+    """Return the size of a .rrd without its last frame if that is cut off, as a killed run may leave it."""
+    size, offset = path.stat().st_size, FILE_HEADER_BYTES
+    with path.open("rb") as file:
+        while offset + FRAME_HEADER_BYTES <= size:
+            file.seek(offset + 8)
+            end = offset + FRAME_HEADER_BYTES + int.from_bytes(file.read(8), "little")
+            if end > size:
+                break
+            offset = end
+    return min(offset, size)
 
 
 class RunLog:

@@ -13,6 +13,7 @@ import polars as pl
 from swarmwire.comms.base.config import check_format, from_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
+from swarmwire.metrics.measures.metric import MetricInfo, metric_infos
 from swarmwire.metrics.records.run_folder.layout import (
     DIGEST_BYTES,
     DIGESTS,
@@ -23,8 +24,6 @@ from swarmwire.metrics.records.run_folder.layout import (
     SUMMARY_FORMAT,
     TABLES_FORMAT,
     VALUE,
-    MetricInfo,
-    metric_infos,
 )
 from swarmwire.metrics.records.run_folder.tables import TABLES, read_static
 from swarmwire.metrics.records.run_folder.ticks import movable_columns, robot_columns

@@ -25,6 +25,7 @@ from swarmwire.metrics.records.run_folder.layout import (
     RUN_JSON,
     STATIC,
     SUMMARY,
+    complete_frames_bytes,
 )
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.run_folder.table import RecordedTable, TableState
@@ -33,8 +34,6 @@ from swarmwire.metrics.records.run_folder.writer import part_file, parts_of, sca
 from swarmwire.metrics.records.table_file import corruption_errors
 
 COPIES = "copies of files"
-FILE_HEADER_BYTES = 12  # magic, version and options of a .rrd
-FRAME_HEADER_BYTES = 16  # kind, and the payload's length in the last 8, little-endian
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,19 +314,6 @@ def _read_all(path: Path) -> tuple[int | None, bool]:
                 return _read(start)[0], False
             except RuntimeError:
                 raise refused from None  # the error about the file itself
-
-
-def complete_frames_bytes(path: Path) -> int:
-    """Return the size of a .rrd without its last frame if that is cut off, as a killed run may leave it."""
-    size, offset = path.stat().st_size, FILE_HEADER_BYTES
-    with path.open("rb") as file:
-        while offset + FRAME_HEADER_BYTES <= size:
-            file.seek(offset + 8)
-            end = offset + FRAME_HEADER_BYTES + int.from_bytes(file.read(8), "little")
-            if end > size:
-                break
-            offset = end
-    return min(offset, size)
 
 
 def _read(path: Path) -> tuple[int | None, bool]:
