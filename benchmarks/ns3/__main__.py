@@ -106,7 +106,7 @@ def _options(arguments: Sequence[str]) -> Namespace:
 
 def _quick(configuration: Configuration) -> Configuration:
     """Less of what takes ns-3 long: many nodes of 802.11."""
-    is_cheap = configuration.standard == "802.15.4" or configuration.places == "line"
+    is_cheap = configuration.standard == "802.15.4" or configuration.layout == "line"
     return configuration if is_cheap else replace(configuration, seeds=3, measured_s=1.0)
 
 

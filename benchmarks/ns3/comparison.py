@@ -45,7 +45,7 @@ def figures_of(configuration: Configuration, received: Received) -> Figures:
     ratio = received.packets / (last - first)
     with np.errstate(invalid="ignore", divide="ignore"):
         delays = {DELAY: 1e-6 * delay_ns / count}
-    if configuration.senders == 2 and configuration.places in ("line", "pairs"):
+    if configuration.senders == 2 and configuration.layout in ("line", "pairs"):
         a, b = (ratio[:, sender, intended[sender]][:, 0] for sender in range(2))
         return {"delivery of a": a, "delivery of b": b, **delays}
     unicast: Figures = {}
@@ -53,7 +53,7 @@ def figures_of(configuration: Configuration, received: Received) -> Figures:
         to_one = intended.sum(axis=1, keepdims=True) == 1
         unicast = {"delivery of unicast": ratio[:, intended & to_one].mean(axis=1)}
         intended &= ~to_one
-    bins = _bins(configuration, intended) if configuration.places == "area" else {}
+    bins = _bins(configuration, intended) if configuration.layout == "area" else {}
     return {
         "delivery": ratio[:, intended].mean(axis=1),
         **unicast,
@@ -66,7 +66,7 @@ def _intended(configuration: Configuration) -> BoolArray:
     """The intended receivers of each sender, (nodes, nodes)."""
     intended = ~np.eye(configuration.nodes, dtype=np.bool_)
     intended[configuration.senders :] = False
-    if configuration.places == "line":
+    if configuration.layout == "line":
         intended[:, : configuration.senders] = False
         return intended
     for sender in range(configuration.senders):
