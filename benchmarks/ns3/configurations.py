@@ -247,7 +247,7 @@ def unicast() -> list[Configuration]:
 
 def exposed() -> list[Configuration]:
     """Two pairs of which one sender hears the other, but not its receiver: only the NAV protects acknowledgements."""
-    more: dict[str, Any] = {"places": "pairs", "size_m": (0.0, -20.0, 40.0, -60.0), "unicast": True, **FEW}
+    more: dict[str, Any] = {"layout": "pairs", "size_m": (0.0, -20.0, 40.0, -60.0), "unicast": True, **FEW}
     full = _configuration(A6, 4, 128, 0.5, **{**more, "is_saturated": True, "seeds": 4})
     return [
         _configuration(B1, 4, 128, 5, **more),
