@@ -124,6 +124,7 @@ def place_robots(
                 break
         if not is_free:
             return robot
+        # Not an assignment to the row: its error's text takes seconds to compile.
         for column, value in enumerate((x, y, disc.radius_m, disc.bottom_m, disc.top_m)):
             occupancy.robot[robot, column] = value
         cell = row_of(occupancy.cells, y) * occupancy.cells.nx + column_of(occupancy.cells, x)

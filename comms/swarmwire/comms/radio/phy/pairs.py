@@ -94,9 +94,10 @@ def _near(x, y, robots, grid, order, propagation):
     ahead = np.empty((len(order), 2, 2), np.uint64)
     capacity = _look_ahead(ahead, x, y, robots, grid, order)
     a, b, loss = np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty(capacity)
-    near, column = np.empty(2 * len(x), np.uint64), np.empty(2 * len(x))
+    near, square_distance_m2 = np.empty(2 * len(x), np.uint64), np.empty(2 * len(x))
+    near_loss_db = np.empty(2 * len(x))
     sorted_x, sorted_y = x[order], y[order]
-    count = _join(a, b, loss, order, sorted_x, sorted_y, ahead, propagation, near, column)
+    count = _join(a, b, loss, order, sorted_x, sorted_y, ahead, propagation, near, square_distance_m2, near_loss_db)
     return a[:count], b[:count], loss[:count]
 
 
@@ -119,7 +120,7 @@ def _look_ahead(ahead, x, y, robots, grid, order):
 
 
 @kernel()
-def _join(a, b, loss, order, x, y, ahead, propagation, near, column):
+def _join(a, b, loss, order, x, y, ahead, propagation, near, square_distance_m2, near_loss_db):
     """Write the pairs and return their number; `x` and `y` are in grid order."""
     count, square_m2, curve = np.uint64(0), propagation.reach_m * propagation.reach_m, propagation.curve
     send_dbm, receive_dbi, min_dbm = (
@@ -133,13 +134,13 @@ def _join(a, b, loss, order, x, y, ahead, propagation, near, column):
             for k in range(ahead[i, j, 0], ahead[i, j, 1]):
                 dx, dy = x[k] - x[i], y[k] - y[i]
                 # Branchless: write first, then advance for a candidate; branches would be mispredicted too often.
-                near[candidates], column[candidates] = k, dx * dx + dy * dy
-                candidates += np.uint64(column[candidates] <= square_m2)
+                near[candidates], square_distance_m2[candidates] = k, dx * dx + dy * dy
+                candidates += np.uint64(square_distance_m2[candidates] <= square_m2)
         for k in range(candidates):  # a loop of its own is vectorised
-            column[k] = loss_db(curve, math.sqrt(column[k]))
+            near_loss_db[k] = loss_db(curve, math.sqrt(square_distance_m2[k]))
         for k in range(candidates):
             r = order[near[k]]
-            a[count], b[count], loss[count] = min(s, r), max(s, r), column[k]
+            a[count], b[count], loss[count] = min(s, r), max(s, r), near_loss_db[k]
             # Pairs must not depend on the antennas of other robots; `reach_m` is that of the best antennas.
             count += np.uint64(_max_dbm(send_dbm, receive_dbi, s, r) - loss[count] >= min_dbm)
     return count
