@@ -38,11 +38,20 @@ class Device:
     tap: int
     program: socket.socket
     changes: socket.socket  # notices of link changes
+    ends: socket.socket  # readable after the end of the process whose namespace it is
     restored: int = 0
+    is_closed: bool = False
 
     @property
     def link_changes(self) -> int:
         return self.changes.fileno()
+
+    @property
+    def process(self) -> int:
+        return self.ends.fileno()
+
+    def close(self) -> None:
+        self.is_closed = True
 
     def restore_routes(self) -> None:
         self.changes.recv(2048)
@@ -81,9 +90,10 @@ def rig() -> Generator[Rig]:
             for end in (world, program):
                 stack.enter_context(end)
                 end.setblocking(False)
-            changes = stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM))
-            changes.bind("")  # the kernel chooses the address
-            devices.append(Device(addresses, world.fileno(), program, changes))
+            changes, ends = (stack.enter_context(socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)) for _ in range(2))
+            for notices in (changes, ends):
+                notices.bind("")  # the kernel chooses the address
+            devices.append(Device(addresses, world.fileno(), program, changes, ends))
         clock = FakeClock()
         pace = Pace(clock, 10, 1.0, lambda _: None)
         pace.begin()
@@ -267,3 +277,15 @@ def test_routes_are_restored_where_links_change(rig):
     device.changes.sendto(b"change", device.changes.getsockname())
     assert not len(rig.pop_sent())
     assert [each.restored for each in rig.devices] == [0, 0, 1]
+
+
+def test_robot_leaves_a_namespace_whose_process_ends_and_others_go_on(rig):
+    rig.devices[1].ends.sendto(b"end", rig.devices[1].ends.getsockname())
+    frame = rig.send(0, station(2))
+    sent = [SentPackets.joined(rig.ports.pop_frames()) for _ in range(2)]
+    assert [len(packets) for packets in sent] == [1, 0]
+    assert exchanged(sent[0].payloads.row(0)) == frame
+    (event,) = rig.ports.pop_events(5 * MS)
+    assert (event.do, event.changed.tolist()) == (INTERFACE_LOST, [False, True, False])
+    assert rig.ports.counts() == {"interfaces_lost": 1}
+    assert [device.is_closed for device in rig.devices] == [False, True, False]

@@ -26,10 +26,12 @@ from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
 from swarmwire.world.interfaces.backend import INTERFACE_LOST, FramePorts
 from swarmwire.world.interfaces.entering import INTERFACES, RobotNamespace, process_start
+from swarmwire.world.interfaces.joining import Join, find_namespaces, joins_of
 from swarmwire.world.interfaces.namespaces import (
     DEVICE,
     NAME,
     USER_NAMESPACE,
+    ExistingNamespace,
     Relay,
     Relays,
     RobotInterface,
@@ -41,8 +43,9 @@ from swarmwire.world.interfaces.programs import DONE, ENDED, Programs, RobotProg
 from swarmwire.world.scenario.scenario import Scenario
 
 KEY = "radio.interface"
+LOST = "a program deleted it, or the process whose namespace it joined has ended"
 PROGRAMS = "programs"  # folder in the run folder: output, scratch folders and host names of programs
-FILES_PER_ROBOT = 3  # open files: its device, its namespace, and the changes of links in it
+FILES_PER_ROBOT = 4  # open files: its device, its namespace with the changes of links in it, and the process of that
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,8 @@ class OpenInterfaces:
         try:
             opened = Relays(relays)
         except OSError as error:
-            raise BadInput("gateways", "", f"expected an address that robots have: {error.strerror}") from error
+            expected = "expected an address that robots have, and lo up in namespaces that they join"
+            raise BadInput("gateways", "", f"{expected}: {error.strerror}") from error
         with closing(opened):
             yield
 
@@ -87,6 +91,7 @@ class RunInterfaces:
     def __init__(self, scenario: Scenario, radio: Radio, interface: Interface) -> None:
         """`interface` is the table of the scenario's `radio`."""
         self._scenario, self._radio, self._interface = scenario, radio, interface
+        self._existing: dict[int, ExistingNamespace] = {}  # by robot
 
     def check(self, static: Static) -> None:
         """Raise BadInput if the scenario or the seeds exclude interfaces; nothing is made."""
@@ -95,15 +100,20 @@ class RunInterfaces:
         self._addresses(static.robots)
         for group in self._scenario.robots:
             self._program(group)
+        self._joins(static)
         check_unused(self._interface, self._scenario.source)
 
     def check_machine(self, static: Static, factor: float | None) -> None:
-        """Raise BadInput for a run in lockstep, whose real-time `factor` is None, or a machine without the rights."""
+        """Find the namespaces that robots join.
+
+        BadInput for a run in lockstep, whose real-time `factor` is None, or a machine without the rights or namespaces.
+        """
         if factor is None:
             expected = "expected realtime 1 with it: programs do not wait for a simulation"
             raise BadInput(self._scenario.source, KEY, expected)
         need_open_files(FILES_PER_ROBOT * static.robots)
         check_rights()
+        self._existing = find_namespaces(self._joins(static), self._interface)
 
     @contextmanager
     def open(self, static: Static, pace: Pace, folder: Path | None) -> Generator[OpenInterfaces]:
@@ -111,8 +121,8 @@ class RunInterfaces:
         with ExitStack() as stack:
             addresses = self._addresses(static.robots)
             interfaces: list[RobotInterface] = []
-            for robot_addresses in addresses:
-                interface = RobotInterface(robot_addresses, self._radio.mtu_bytes)
+            for robot in range(static.robots):
+                interface = self._new_interface(static, robot, addresses[robot])
                 stack.callback(interface.close)
                 interfaces.append(interface)
             ports = stack.enter_context(closing(FramePorts(interfaces, pace)))
@@ -123,6 +133,13 @@ class RunInterfaces:
             namespaces = _namespaces(static, interfaces, host_names)
             programs = stack.enter_context(closing(self._new_programs(static, namespaces, addresses, files)))
             yield OpenInterfaces(tuple(interfaces), ports, programs, namespaces, addresses, folder)
+
+    def _new_interface(self, static: Static, robot: int, addresses: Addresses) -> RobotInterface:
+        try:
+            return RobotInterface(addresses, self._radio.mtu_bytes, self._existing.get(robot))
+        except OSError as error:
+            join = self._joins(static).get(robot)
+            raise join.failed(error) if join else BadInput(KEY, "", missing_right(error)) from error
 
     def _new_programs(
         self, static: Static, namespaces: Sequence[RobotNamespace], addresses: Sequence[Addresses], files: Path
@@ -147,6 +164,9 @@ class RunInterfaces:
             expected = f"expected a program that can be run, got {name!r}"
             raise BadInput(self._scenario.source, f"robots.{group}.program", expected)
         return (str(path), *command[1:])
+
+    def _joins(self, static: Static) -> dict[int, Join]:
+        return joins_of(self._interface, static, self._scenario.source)
 
     def _addresses(self, robots: int) -> tuple[Addresses, ...]:
         return addresses_of(self._interface, robots, self._radio.mtu_bytes, self._scenario.source)
@@ -215,7 +235,7 @@ class InterfacesLog(Observer):
             robot = int(event.changed.argmax())
             name = self._opened.namespaces[robot].robot
             if event.do == INTERFACE_LOST:
-                self._report(f"{name} has no {NAME} any more: a program deleted it, so its programs are off the air")
+                self._report(f"{name} has no {NAME} any more: {LOST}, so its programs are off the air")
             elif event.do == ENDED and event.part not in self._reported:
                 self._reported.add(event.part)
                 line = self._opened.programs.last_line(robot)

@@ -1,6 +1,6 @@
 """The addresses of robots' interfaces, derived from the scenario's network and the robot's index."""
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from ipaddress import IPv4Address, IPv4Interface, IPv4Network, IPv6Address, IPv6Interface
 from pathlib import Path
@@ -49,27 +49,33 @@ def addresses_of(interface: Interface, robots: int, mtu_bytes: int, where: str) 
     )
 
 
-def check_unused(interface: Interface, where: str, routes: str | None = None) -> None:
-    """Raise BadInput if an interface of this machine has addresses of the network.
+def check_unused(interface: Interface, where: str, routes: str | None = None, user: str = "this machine") -> None:
+    """Raise BadInput if a device of this machine, or of another user, has addresses of the network.
 
-    `routes` is the content of /proc/net/route, and by default read from there.
+    `routes` is the content of the user's /proc/net/route, and by default read from there.
     """
     network = IPv4Network(interface.network)
     for name, connected in _connected(ROUTES.read_text() if routes is None else routes):
         if network.overlaps(connected):
-            expected = f"expected a network that this machine does not use: {name} has {connected}"
+            expected = f"expected a network that {user} does not use: {name} has {connected}"
             raise BadInput(where, KEY, f"{expected}; got {network}")
+
+
+def has_default_route(routes: str) -> bool:
+    """Return True if a content of /proc/net/route has a route to all addresses."""
+    return any(not network.prefixlen for _, network, _ in _parsed(routes))
 
 
 def _connected(routes: str) -> Sequence[tuple[str, IPv4Network]]:
     """Return the names of interfaces, and the networks to which they are connected."""
-    networks: list[tuple[str, IPv4Network]] = []
+    return [(name, network) for name, network, flags in _parsed(routes) if not flags & IS_GATEWAY and network.prefixlen]
+
+
+def _parsed(routes: str) -> Generator[tuple[str, IPv4Network, int]]:
+    """Yield name of the device, network and flags of each route."""
     for line in routes.splitlines()[ROUTE_HEADER_LINES:]:
         name, destination, _, flags, _, _, _, mask, *_ = line.split()
-        if not int(flags, 16) & IS_GATEWAY and int(mask, 16):
-            network = IPv4Network((_address(destination), str(_address(mask))))
-            networks.append((name, network))
-    return networks
+        yield name, IPv4Network((_address(destination), str(_address(mask)))), int(flags, 16)
 
 
 def _address(text: str) -> IPv4Address:

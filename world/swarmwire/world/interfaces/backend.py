@@ -30,6 +30,7 @@ INTERFACE_LOST = "interface_lost"  # action of the event
 TAG = FRAME_TAG.to_bytes(TAG_BYTES, "little")
 MAX_FRAME_BYTES = HEADER_BYTES + 65_535
 MAX_READS = 64  # frames of one device in a sub-tick: a program that floods its device must not stop the world
+NO_DESCRIPTOR = -1
 LATENCY_BATCH = 1024  # latencies that are counted at once, since a batch costs as much as one
 SPREAD_KEY, SPREAD = np.array([derive_key("frames")], np.uint64), purpose("send time of frames")
 
@@ -54,7 +55,8 @@ class FramePorts:
         self._epoll = select.epoll()
         self._robot_of = {interface.tap: robot for robot, interface in enumerate(interfaces)}
         self._interface_of = {interface.link_changes: interface for interface in interfaces}
-        for descriptor in (*self._robot_of, *self._interface_of):
+        self._robot_of_process = {interface.process: robot for robot, interface in enumerate(interfaces)}
+        for descriptor in {*self._robot_of, *self._interface_of, *self._robot_of_process} - {NO_DESCRIPTOR}:
             self._epoll.register(descriptor, select.EPOLLIN)
         self._lost: list[int] = []  # robots that lost their device since the last `pop_events`
         self._counts = Counter[str]()
@@ -74,6 +76,9 @@ class FramePorts:
                 if descriptor in self._interface_of:
                     self._interface_of[descriptor].restore_routes()
                     continue
+                if descriptor in self._robot_of_process:
+                    self._leave(self._robot_of_process[descriptor])
+                    break  # its other descriptors are closed
                 robot, frame = self._robot_of[descriptor], self._read(descriptor)
                 if frame[ADDRESS_BYTES : 2 * ADDRESS_BYTES] == self._interfaces[robot].addresses.mac:
                     frames.setdefault(robot, []).append(frame)
@@ -143,11 +148,26 @@ class FramePorts:
         except BlockingIOError:  # a program has set the device down, which empties its queue
             return b""
         except OSError:  # EBADFD: deleted, or its namespace has ended
-            self._epoll.unregister(tap)
-            self._counts["interfaces_lost"] += 1
-            self._lost.append(self._robot_of[tap])
+            self._lose(self._robot_of[tap])
             return b""
         return bytes(self._buffer[:size])
+
+    def _lose(self, robot: int) -> None:
+        """Count a device that is gone, and read it no more."""
+        tap = self._interfaces[robot].tap
+        self._epoll.unregister(tap)
+        del self._robot_of[tap]
+        self._counts["interfaces_lost"] += 1
+        self._lost.append(robot)
+
+    def _leave(self, robot: int) -> None:
+        """Close the interface in a namespace whose process has ended, so that the namespace can end, too."""
+        interface = self._interfaces[robot]
+        if interface.tap in self._robot_of:
+            self._lose(robot)
+        for descriptor in {interface.process, interface.link_changes} - {NO_DESCRIPTOR}:
+            self._epoll.unregister(descriptor)
+        interface.close()
 
     def _write(self, receiver: int, frame: bytes) -> None:
         try:

@@ -1,6 +1,7 @@
-"""Network namespaces without names, each with a TAP device: they exist while their descriptors are open.
+"""Network namespaces, each with a TAP device: new ones without names, or existing ones that a robot joins.
 
-So they end with this process, also when it is killed. A separate thread enters a namespace, makes its sockets and
+Devices and new namespaces exist while their descriptors are open, so they end with this process, also when it is
+killed. In an existing namespace only the device is made. A separate thread enters a namespace, makes its sockets and
 devices, and ends: these stay in the namespace in which they were made, and other threads never change theirs.
 
 `Relays` lets programs in a namespace reach their robot's gateway: it relays connections to the gateway's server.
@@ -21,7 +22,7 @@ from threading import Event, Thread
 from typing import NamedTuple, TypeVar
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.world.interfaces.addresses import Addresses
+from swarmwire.world.interfaces.addresses import Addresses, has_default_route
 from swarmwire.world.interfaces.routes import MulticastRoutes
 
 T = TypeVar("T")
@@ -31,6 +32,7 @@ NAME = "radio0"  # name of each robot's device
 DEVICE = Path("/dev/net/tun")
 CLONE_NEWNET = 0x40000000  # linux/sched.h
 TUNSETIFF, IFF_TAP, IFF_NO_PI = 0x400454CA, 0x0002, 0x1000  # linux/if_tun.h
+IFF_TUN_EXCL = 0x8000  # EBUSY for an existing device, also for one that persists without a program
 TUNGETIFF, TUNGETDEVNETNS = 0x800454D2, 0x54E3
 SIOCSIFFLAGS, SIOCSIFADDR, SIOCSIFNETMASK, SIOCSIFMTU = 0x8914, 0x8916, 0x891C, 0x8922  # linux/sockios.h
 SIOCSIFHWADDR = 0x8924
@@ -41,8 +43,9 @@ USER_NAMESPACE = ("--user", "--map-current-user", "--keep-caps")  # options of u
 NAME_BYTES = 16  # IFNAMSIZ
 CHUNK_BYTES = 65_536  # most bytes that a relay copies at once
 # Addresses are unique by construction, so duplicate address detection is off; robots have no router. IPv6 addresses
-# survive `ip link set radio0 down`, as IPv4 addresses do.
+# survive `ip link set radio0 down`, as IPv4 addresses do. Containers often start with IPv6 off for new devices.
 IPV6_SETTINGS = {
+    "disable_ipv6": "0",
     "accept_dad": "0",
     "dad_transmits": "0",
     "accept_ra": "0",
@@ -51,29 +54,37 @@ IPV6_SETTINGS = {
 }
 
 
+class ExistingNamespace(NamedTuple):
+    """A network namespace that a robot joins."""
+
+    path: Path
+    pid: int | None  # process with whose end the robot leaves it; None: the robot stays until the end of the run
+
+
 class RobotInterface:
     """A robot's network namespace with its TAP device, up and with its addresses.
 
     Attributes:
         tap: descriptor of the device; reads and writes are complete frames and do not block.
         namespace: descriptor of the namespace.
-        link_changes: descriptor that is readable when `restore_routes` is due.
+        link_changes: descriptor that is readable when `restore_routes` is due; -1: never.
+        process: descriptor that is readable when the process has ended whose namespace it is; -1: none.
     """
 
-    def __init__(self, addresses: Addresses, mtu_bytes: int) -> None:
-        """BadInput if rights are missing."""
+    def __init__(self, addresses: Addresses, mtu_bytes: int, existing: ExistingNamespace | None = None) -> None:
+        """OSError if rights are missing, or the existing namespace cannot have the device."""
         self.addresses = addresses
-        self.namespace = self.tap = self.link_changes = -1
+        self.namespace = self.tap = self.link_changes = self.process = -1
         self._routes: MulticastRoutes | None = None
         try:
-            _in_thread(lambda: self._make(mtu_bytes))
-        except OSError as error:
+            _in_thread(lambda: self._make(mtu_bytes, existing))
+        except OSError:
             self.close()
-            raise BadInput(WHERE, KEY, missing_right(error)) from error
+            raise
 
     def call_inside(self, function: Callable[[], T]) -> T:
         """Call `function` in a thread inside the namespace, for example to open a socket; return its result."""
-        return _call_inside(self.namespace, function)
+        return call_inside(self.namespace, function)
 
     def restore_routes(self) -> None:
         """Restore the multicast routes that the kernel removed when a program set the device down."""
@@ -82,11 +93,13 @@ class RobotInterface:
 
     def dropped(self) -> int:
         """Return the number of frames that the kernel dropped in both directions; 0 for a deleted device."""
+        if self.tap < 0:
+            return 0
         try:  # a program may have renamed the device, or moved it to another namespace
             name = fcntl.ioctl(self.tap, TUNGETIFF, bytes(NAME_BYTES + 24))[:NAME_BYTES].rstrip(b"\0").decode()
             namespace = fcntl.ioctl(self.tap, TUNGETDEVNETNS)
             try:
-                table = _call_inside(namespace, lambda: Path("/proc/thread-self/net/dev").read_text())
+                table = call_inside(namespace, lambda: Path("/proc/thread-self/net/dev").read_text())
             finally:
                 os.close(namespace)
         except OSError:
@@ -99,18 +112,19 @@ class RobotInterface:
         """Close device and namespace, which end once no process is in it; safe to call more than once."""
         if self._routes:
             self._routes.close()
-        for descriptor in (self.tap, self.namespace):
+            self._routes = None
+        for descriptor in (self.tap, self.namespace, self.process):
             if descriptor >= 0:
                 os.close(descriptor)
-        self.namespace = self.tap = self.link_changes = -1
+        self.namespace = self.tap = self.link_changes = self.process = -1
 
-    def _make(self, mtu_bytes: int) -> None:
-        _check(_libc().unshare(CLONE_NEWNET), "unshare")
-        self.namespace = os.open("/proc/thread-self/ns/net", os.O_RDONLY | os.O_CLOEXEC)
+    def _make(self, mtu_bytes: int, existing: ExistingNamespace | None) -> None:
+        self._enter(existing)
         self.tap = os.open(DEVICE, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
-        fcntl.ioctl(self.tap, TUNSETIFF, struct.pack("16sH", NAME.encode(), IFF_TAP | IFF_NO_PI))
+        fcntl.ioctl(self.tap, TUNSETIFF, struct.pack("16sH", NAME.encode(), IFF_TAP | IFF_NO_PI | IFF_TUN_EXCL))
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
-            _set(control, "lo", SIOCSIFFLAGS, struct.pack("H", IFF_UP))
+            if existing is None:
+                _set(control, "lo", SIOCSIFFLAGS, struct.pack("H", IFF_UP))
             _set(control, NAME, SIOCSIFHWADDR, struct.pack("H6s", ARPHRD_ETHER, self.addresses.mac))
             _set(control, NAME, SIOCSIFMTU, struct.pack("i", mtu_bytes))
             for setting, value in IPV6_SETTINGS.items():
@@ -121,8 +135,21 @@ class RobotInterface:
             _set(control, NAME, SIOCSIFFLAGS, struct.pack("H", IFF_UP | IFF_MULTICAST))
         if self.addresses.ipv6 is not None:
             self._add_ipv6(self.addresses.ipv6.ip.packed, self.addresses.ipv6.network.prefixlen)
-        self._routes = MulticastRoutes(NAME)
-        self.link_changes = self._routes.fileno()
+        # Where programs have another network, what they send without an interface stays on it.
+        if existing is None or not has_default_route(Path("/proc/thread-self/net/route").read_text()):
+            self._routes = MulticastRoutes(NAME)
+            self.link_changes = self._routes.fileno()
+
+    def _enter(self, existing: ExistingNamespace | None) -> None:
+        """Move this thread to a new namespace, or to an existing one."""
+        if existing is None:
+            _check(_libc().unshare(CLONE_NEWNET), "unshare")
+            self.namespace = os.open("/proc/thread-self/ns/net", os.O_RDONLY | os.O_CLOEXEC)
+            return
+        if existing.pid is not None:
+            self.process = os.pidfd_open(existing.pid)
+        self.namespace = os.open(existing.path, os.O_RDONLY | os.O_CLOEXEC)
+        _check(_libc().setns(self.namespace, CLONE_NEWNET), "setns")
 
     def _add_ipv6(self, address: bytes, prefix_bits: int) -> None:
         with suppress(OSError), socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as control:  # machines without IPv6
@@ -171,7 +198,7 @@ def _in_thread(function: Callable[[], T]) -> T:
         return threads.submit(function).result()
 
 
-def _call_inside(namespace: int, function: Callable[[], T]) -> T:
+def call_inside(namespace: int, function: Callable[[], T]) -> T:
     """Call `function` in a thread inside the network namespace of this descriptor; return the result."""
 
     def enter_and_call() -> T:

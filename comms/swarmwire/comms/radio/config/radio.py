@@ -56,6 +56,11 @@ class Interface:
     """A network interface on each robot, for programs: its frames are packets of this radio. Requires real time."""
 
     network: str = parameter("10.77.0.0/16", help="IPv4 network whose first addresses the robots get, in order")
+    join: dict[str, str] | None = parameter(
+        None,
+        help="existing network namespaces, by robot or group: netns:NAME, pid:NUMBER or container:NAME, where {index} "
+        "and {name} are the robot's; default: a new one for each robot",
+    )
 
 
 DATAGRAM_BYTES = 28  # IPv4 and UDP headers
