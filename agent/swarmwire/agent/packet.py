@@ -91,7 +91,7 @@ class Packets(Generic[M]):
 
     @property
     def range_m(self) -> FloatArray:
-        """Distance to the sender when the packet went on air, (k,)."""
+        """Distance in space to the sender when the packet went on air, (k,)."""
         return self._measured("radio.range", "range_m")
 
     @property
@@ -209,7 +209,7 @@ class Packet(Generic[M]):
 
     @property
     def range_m(self) -> float:
-        """Distance to the sender when the packet went on air."""
+        """Distance in space to the sender when the packet went on air."""
         return self._lists.measured("radio.range", "range_m")[self._index]
 
     @property

@@ -28,7 +28,7 @@ def strength_dbm(obstacles: ObstacleIndex, x: float, y: float) -> float:
     """What a receiver at (x, y) in m has of a sender with 0 dBm."""
     loss = loss_db(CURVE, math.dist(SENDER, (x, y)))
     entered = np.empty((len(obstacles.shape), 2))
-    walls = wall_loss_db(obstacles, entered, 0, WALLS.crossing_db, WALLS.inside_db_per_m, *SENDER, x, y)
+    walls = wall_loss_db(obstacles, entered, 0, WALLS.crossing_db, WALLS.inside_db_per_m, *SENDER, 0.0, x, y, 0.0)
     return rssi_dbm(0.0, 0.0, 0.0, loss + walls)
 
 

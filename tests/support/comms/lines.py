@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex, obstacles_within
 from swarmwire.comms.base.geometry.obstacles import (
     Obstacles,
@@ -13,7 +14,7 @@ from swarmwire.comms.base.geometry.obstacles import (
     to_nearest,
 )
 from swarmwire.comms.base.geometry.shapes import Obstacle
-from swarmwire.comms.radio.propagation.obstruction import chord_in_circle, chord_in_polygon
+from swarmwire.comms.radio.propagation.obstruction import chord_in_circle, chord_in_polygon, crossed_and_inside_m
 
 Arenas = tuple[tuple[Obstacle, ...], ...]
 
@@ -21,6 +22,19 @@ Arenas = tuple[tuple[Obstacle, ...], ...]
 def indexed(arenas: Arenas, size_m: tuple[float, float]) -> ObstacleIndex:
     """The obstacle index that a radio has."""
     return obstacles_within(obstacle_arrays(arenas), size_m, 0.0, torus=False)
+
+
+def is_blocked_on_floor(
+    obstacles: ObstacleIndex, arena: int, x0: float, y0: float, x1: float, y1: float, *wrap_m: float
+) -> bool:
+    """Whether an obstacle blocks the line between two points on the floor; of a torus with the sides `wrap_m`."""
+    return is_blocked(obstacles, arena, x0, y0, 0.0, x1, y1, 0.0, *(wrap_m or (0.0, 0.0)))
+
+
+def crossed_on_floor(obstacles: ObstacleIndex, arena: int, ax: float, ay: float, bx: float, by: float):
+    """`crossed_and_inside_m` of a line between two points on the floor, with a buffer that an earlier line left."""
+    entered = np.full((len(obstacles.shape), 2), np.nan)
+    return crossed_and_inside_m(obstacles, entered, arena, ax, ay, 0.0, bx, by, 0.0)
 
 
 def touches_any(obstacles: Obstacles, arena: int, x0: float, y0: float, x1: float, y1: float) -> bool:

@@ -198,6 +198,11 @@ def at(*positions: tuple[float, ...]) -> FloatArray:
     return np.array([(*p, 0.0)[:3] for p in positions], np.float64)
 
 
+def in_air(*positions: tuple[float, float, float]) -> FloatArray:
+    """Poses (rows, 4) from (x, y, z)."""
+    return np.array([(x, y, 0.0, z) for x, y, z in positions], np.float64)
+
+
 def random_traffic(rng: np.random.Generator, arenas: int, robots: int) -> SentPackets:
     """Some robots send some packets, to all or to one, in any order."""
     k = int(rng.integers(0, 3 * robots))

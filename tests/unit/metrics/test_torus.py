@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.metrics.measures.torus import link_lines, shortest_displacement, unwrap_path
 from swarmwire.metrics.pictures.drawing.swarm import in_range
 from swarmwire.metrics.records.run_folder.distances import RobotPositions
-from tests.support.comms.lines import indexed
+from tests.support.comms.lines import indexed, is_blocked_on_floor
 from tests.support.metrics.films import OBSTACLES
 from tests.support.metrics.truths import static
 
@@ -57,7 +56,7 @@ def test_pictures_join_robots_across_the_seam_as_the_air_does():
         (i, j)
         for i in range(70)
         for j in range(i + 1, 70)
-        if apart(at[i], at[j]) <= 2.0 and not is_blocked(index, 0, *at[i], *at[j], *SIZE_M)
+        if apart(at[i], at[j]) <= 2.0 and not is_blocked_on_floor(index, 0, *at[i], *at[j], *SIZE_M)
     }
     found = in_range(at, np.ones(70, np.bool_), 2.0, OBSTACLES, SIZE_M)
     assert {(min(pair), max(pair)) for pair in found.tolist()} == joined

@@ -14,6 +14,7 @@ from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeas
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import number_of
+from swarmwire.comms.radio.context import in_space
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Jammers
 from swarmwire.world.events.effects import ActiveEffects
 from swarmwire.world.events.event import as_toml
@@ -189,14 +190,14 @@ def test_jammer_stands_at_its_position_in_every_arena():
     jammers = started_jammers(jammer(at=(1.0, -2.0)))
     assert jammers.arena.tolist() == [0, 1]
     assert jammers.carrier.tolist() == [NO_ROBOT, NO_ROBOT]
-    assert jammers.positions(APART.pose).tolist() == [[1.0, -2.0]] * 2
+    assert jammers.positions(in_space(APART.pose)).tolist() == [[1.0, -2.0, 0.0]] * 2
 
 
 def test_jammer_moves_with_its_carrier():
     jammers = started_jammers(jammer(robots=Selection(names=("a-1",))))
     assert jammers.arena.tolist() == [0, 1]
     assert jammers.carrier.tolist() == [1, 4]
-    assert jammers.positions(APART.pose).tolist() == [[3.0, 4.0], [12.0, 13.0]]
+    assert jammers.positions(in_space(APART.pose)).tolist() == [[3.0, 4.0, 0.0], [12.0, 13.0, 0.0]]
 
 
 def test_jammers_of_several_events_add_up_and_end_one_by_one():

@@ -29,6 +29,19 @@ def sample_world(*seeds: int) -> World:
     return World(scenario_from(SAMPLE, "f"), seeds, ALL_SENSORS)
 
 
+def test_radio_poses_have_the_heights_of_bodies_until_others_are_set() -> None:
+    group = {"count": 1, "agent": "x"}
+    robots = {"low": {**group, "body": "epuck"}, "high": {**group, "body": "crazyflie"}}
+    world = World(posed([], robots=robots), [1, 2], {})
+    assert world.radio_pose[:, 3].tolist() == [0.0, 0.5] * 2
+    assert np.array_equal(world.radio_pose[:, :3], world.pose)
+    before = world.radio_pose
+    world.altitude_m[1] = 2.0, 3.0
+    world.move(commanded(world, 0.0, 0.0))
+    assert world.radio_pose[:, 3].tolist() == [0.0, 0.5, 2.0, 3.0]
+    assert before[:, 3].tolist() == [0.0, 0.5] * 2
+
+
 def test_arena_runs_equally_alone_and_among_seven_others() -> None:
     many = sample_world(*range(8))
     alone = [sample_world(seed) for seed in (2, 7)]

@@ -275,14 +275,14 @@ class Loop:
 
     def _receive(self, start_ns: int, effects: Effects) -> tuple[Results | None, ReceivedPackets, TxStatuses]:
         """Return the results of the medium up to a tick's start, and the packets and statuses for the backend."""
-        world, tick = self.world, self.ticks_done
+        world, pose, tick = self.world, self.world.radio_pose, self.ticks_done
         if self.medium is None:
             return None, ReceivedPackets.none(), NO_TX_STATUSES
         if self._subtick:
-            results, received, tx_status = self._subtick.step(start_ns, world.pose, effects.disruption, effects.radio)
+            results, received, tx_status = self._subtick.step(start_ns, pose, effects.disruption, effects.radio)
             self._unseen = results.tally
             return results, received, tx_status
-        results = self.medium.step(start_ns, world.pose, effects.disruption, effects.radio)
+        results = self.medium.step(start_ns, pose, effects.disruption, effects.radio)
         self._unseen = results.tally
         packets = self._mailbox.pop_packets(tick, results.received, world.alive)
         tx_status = self._mailbox.pop_tx_statuses(tick, results.tx_status, world.alive)

@@ -38,30 +38,38 @@ _wrap_angle = njit()(wrap_angle)
 
 
 @njit()
-def snapshot(state: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return poses and velocities, (rows, 3) each, of a state (arenas, robots, 6); headings in (-pi, pi]."""
+def snapshot(state: FloatArray, altitude_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return poses and velocities, (rows, 3) each, of a state (arenas, robots, 6); headings in (-pi, pi].
+
+    The third array, (rows, 4), has the poses and then `altitude_m` (arenas, robots).
+    """
     arenas, robots = state.shape[:2]
     pose, velocity = np.empty((arenas * robots, 3)), np.empty((arenas * robots, 3))
+    radio_pose = np.empty((arenas * robots, 4))
     for arena in range(arenas):
         for i in range(robots):
             row, heading = arena * robots + i, _wrap_angle(state[arena, i, 2])
             pose[row, 0], pose[row, 1], pose[row, 2] = state[arena, i, 0], state[arena, i, 1], heading
             for column in range(3):
                 velocity[row, column] = state[arena, i, 3 + column]
-    return pose, velocity
+                radio_pose[row, column] = pose[row, column]
+            radio_pose[row, 3] = altitude_m[arena, i]
+    return pose, velocity, radio_pose
 
 
 class World:
     """Arenas side by side, one per seed; robot row r is robot r % robots of arena r // robots.
 
-    Each tick: `sense`, then `move`. The arrays below, except `alive` and `running`, are replaced in each tick and never
-    written to after. The values of an arena that left (`leave`) have no meaning.
+    Each tick: `sense`, then `move`. The arrays below, except `alive`, `altitude_m` and `running`, are replaced in each
+    tick and never written to after. The values of an arena that left (`leave`) have no meaning.
 
     Attributes:
         static: the constants of the run.
         keys: (arenas,) the key of each arena's draws, which depends on its seed alone.
         pose: (rows, 3) x, y in m, heading in rad in (-pi, pi], arena frame.
         velocity: (rows, 3) m/s, m/s, rad/s, arena frame.
+        radio_pose: (rows, 4) `pose`, and the height of each robot's lower side and antenna above the floor in m.
+        altitude_m: (arenas, robots) these heights, by default of the bodies; may be written to.
         movable: (arenas, movable obstacles, 3) x, y in m, heading in rad; None: there are none.
         actuators: motors and LEDs: commands and targets.
         alive: (rows,) written in place by `set_alive`; False in an arena that left.
@@ -94,6 +102,8 @@ class World:
         self.obstacles = obstacle_arrays(self.static.obstacles)
         engines, pose = engines_of(scenario, bodies), np.stack([placement.pose for placement in placements])
         self._physics = Physics(self.static, self.obstacles, engines, pose, scenario.physics.steps)
+        altitudes_m = [np.full(group.stop - group.start, group.body.altitude_m) for group in groups]
+        self.altitude_m: FloatArray = np.tile(np.concatenate(altitudes_m), (self.static.arenas, 1))
         self.actuators = Actuators(groups, self.keys)
         tick_s = 1.0 / scenario.time.rate_hz
         self.batteries = Batteries(groups, self.static.arenas, tick_s)
@@ -211,7 +221,7 @@ class World:
         }
 
     def _update_poses(self) -> None:
-        self.pose, self.velocity = snapshot(self._physics.state)
+        self.pose, self.velocity, self.radio_pose = snapshot(self._physics.state, self.altitude_m)
         self.movable: FloatArray | None = self._physics.movable.copy() if self.static.movable else None
 
     def _scene_of(self, tick_s: float, threads: Threads) -> Scene:

@@ -14,6 +14,13 @@ from swarmwire.comms.radio.disruption import ActiveDisruption
 from swarmwire.comms.radio.traces import LinkTraces
 
 
+def in_space(pose: FloatArray) -> FloatArray:
+    """Return poses (rows, 4), x, y, heading and height, of poses (rows, 3) or (rows, 4); without heights they are 0."""
+    if pose.shape[1] == 3:
+        pose = np.column_stack([pose, np.zeros(len(pose))])
+    return np.ascontiguousarray(pose)  # one layout: kernels are compiled once
+
+
 @dataclass(frozen=True, slots=True)
 class ChannelContext:
     """The radio, the arenas and the robots of one medium; robot row r is robot r % robots of arena r // robots.
@@ -27,6 +34,7 @@ class ChannelContext:
     size_m: tuple[float, float]  # sides of an arena
     obstacles: ObstacleIndices  # without periodic images
     radius_m: FloatArray  # (rows,) radii of the robots; 0: no body
+    height_m: FloatArray  # (rows,) heights of their bodies
     antennas: Antennas  # antennas of the robots of an arena
     disruption: ActiveDisruption
     running: BoolArray  # (arenas,) False: the arena has ended
@@ -58,6 +66,7 @@ class ChannelContext:
             size_m,
             ObstacleIndices(arrays, size_m, 0.0, obstacles_move=obstacles_move),
             np.zeros(rows),
+            np.full(rows, np.inf),
             Antennas.alike(robots),
             ActiveDisruption.none(rows),
             np.ones(arenas, np.bool_),

@@ -34,9 +34,12 @@ class Jammers(NamedTuple):
         return Jammers._make(np.concatenate(columns) for columns in zip(self, later, strict=True))
 
     def positions(self, pose: FloatArray) -> FloatArray:
-        """Return the position of each jammer with robots at `pose` (rows, 3): x and y in m, (k, 2)."""
-        fixed = np.stack([self.x_m, self.y_m], axis=1)
-        return np.where((self.carrier == NO_ROBOT)[:, None], fixed, pose[self.carrier, :2])
+        """Return the position of each jammer with robots at `pose` (rows, 4): x, y, z in m, (k, 3).
+
+        Those that no robot carries are on the floor.
+        """
+        fixed = np.stack([self.x_m, self.y_m, np.zeros(len(self.x_m))], axis=1)
+        return np.where((self.carrier == NO_ROBOT)[:, None], fixed, pose[self.carrier][:, [0, 1, 3]])
 
     def is_on(self, at_ns: int) -> BoolArray:
         """Return True for each jammer that is on from `at_ns` on, (k,)."""

@@ -16,7 +16,7 @@ from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
-from swarmwire.comms.radio.context import ChannelContext
+from swarmwire.comms.radio.context import ChannelContext, in_space
 from swarmwire.comms.radio.counters import PacketCounters
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import RECEIVED, Links
@@ -132,7 +132,8 @@ class RadioMedium:
 
         Args:
             start_ns: the start of the tick; ValueError if it has passed.
-            pose: x, y in m and heading in rad, (rows, 3); the array must not change afterwards.
+            pose: x, y in m, heading in rad and height of the antenna above the floor in m, (rows, 4), or without
+                heights, (rows, 3), for robots on the floor; the array must not change afterwards.
             disruption: the state of robots and radios from now on; None: unchanged.
             radio: the parameters from now on, for packets that neither wait nor are on air. Only numeric
                 parameters may change. None: unchanged.
@@ -140,6 +141,7 @@ class RadioMedium:
         Returns:
             All results since the last step, those of `advance` included, and the radio graph at `pose`.
         """
+        pose = in_space(pose)
         self._model.expect(pose)
         self._pass_time(start_ns)
         liveness = self._liveness

@@ -22,7 +22,7 @@ class RadioModel(ABC):
     """The radios and the channel between them: packets go in, links with fates come out.
 
     `pass_time` and `disrupt` append links with fates, and a PHY also their packets, to the tables of the medium. A fate
-    may become final later than the time that has passed.
+    may become final later than the time that has passed. Poses (rows, 4) are x, y in m, heading in rad and height in m.
     """
 
     @property
@@ -32,10 +32,10 @@ class RadioModel(ABC):
 
     @abstractmethod
     def set_poses(self, pose: FloatArray) -> None:
-        """Use `pose` (rows, 3) and the active disruption from now on; the array must not change."""
+        """Use `pose` (rows, 4) and the active disruption from now on; the array must not change."""
 
     def expect(self, pose: FloatArray) -> None:  # noqa: B027 - a model may have nothing to do
-        """Prepare for the next poses, `pose` (rows, 3), which `set_poses` then sets."""
+        """Prepare for the next poses, `pose` (rows, 4), which `set_poses` then sets."""
 
     @abstractmethod
     def tune(self, at_ns: int, radio: Radio) -> None:

@@ -115,10 +115,13 @@ def new_medium(
     context = ChannelContext.open_space(
         radio, world.keys, static.robots, size_m, world.obstacles, obstacles_move=obstacles_move
     )
-    radius_m = np.concatenate([np.full(group.stop - group.start, group.body.radius_m) for group in static.groups])
+    counts = [group.stop - group.start for group in static.groups]
+    radius_m = np.repeat([group.body.radius_m for group in static.groups], counts)
+    height_m = np.repeat([group.body.height_m for group in static.groups], counts)
     context = replace(
         context,
         radius_m=np.tile(radius_m, len(world.keys)),
+        height_m=np.tile(height_m, len(world.keys)),
         antennas=Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values()),
         traces=traces,
         is_torus=static.boundary == "torus",

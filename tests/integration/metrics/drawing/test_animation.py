@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Group, Static
 from swarmwire.comms.robot.bodies.body import load_body
@@ -18,7 +17,7 @@ from swarmwire.metrics.pictures.drawing.canvas import DEAD, OTHER_STATE, STATE_C
 from swarmwire.metrics.pictures.drawing.film import NO_STATE, Film
 from swarmwire.metrics.pictures.drawing.scenario import _facts
 from swarmwire.metrics.pictures.drawing.swarm import in_range
-from tests.support.comms.lines import indexed
+from tests.support.comms.lines import indexed, is_blocked_on_floor
 from tests.support.metrics.films import LIGHT, OBSTACLES, film, two_groups
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
@@ -238,7 +237,7 @@ def test_obstacles_are_in_the_way_as_they_are_in_the_air(obstacle: Obstacle):
         (i, j)
         for i in range(60)
         for j in range(i + 1, 60)
-        if not is_blocked(index, 0, *position_m[i], *position_m[j], 0.0, 0.0)
+        if not is_blocked_on_floor(index, 0, *position_m[i], *position_m[j])
     }
     found = in_range(position_m, np.ones(60, np.bool_), 9.0, (obstacle,))
     assert {(min(pair), max(pair)) for pair in found.tolist()} == expected

@@ -13,7 +13,6 @@ from swarmwire.comms.base.angles import wrap_angle, wrap_angles, wrap_by_atan2, 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.base.geometry.ground import ground_of, shade_at, shades_over
-from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import obstacles_near, obstacles_within, ray_to_obstacle
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, ray_to_circle, ray_to_polygon
 from swarmwire.comms.base.geometry.robot_index import (
@@ -29,7 +28,7 @@ from swarmwire.comms.base.geometry.robot_index import (
 )
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
-from tests.support.comms.lines import indexed
+from tests.support.comms.lines import indexed, is_blocked_on_floor
 
 SIDES = st.floats(0.1, 50.0)
 SIZE_M = (4.0, 2.0)
@@ -224,7 +223,7 @@ def test_ray_along_the_sides_of_a_box(x: float, y: float, dx: float, dy: float, 
 def test_line_of_sight_is_equal_in_both_directions() -> None:
     obstacles = indexed(ARENAS, OBSTACLE_ARENA_M)
     for x0, y0, x1, y1 in np.random.default_rng(3).uniform(-3.0, 3.0, (500, 4)):
-        assert is_blocked(obstacles, 0, x0, y0, x1, y1, 0.0, 0.0) == is_blocked(obstacles, 0, x1, y1, x0, y0, 0.0, 0.0)
+        assert is_blocked_on_floor(obstacles, 0, x0, y0, x1, y1) == is_blocked_on_floor(obstacles, 0, x1, y1, x0, y0)
 
 
 def test_obstacle_arrays_are_grouped_by_arena_with_heights_that_default_to_infinity() -> None:

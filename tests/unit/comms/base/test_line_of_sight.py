@@ -16,7 +16,9 @@ from swarmwire.comms.radio.propagation.obstruction import crossed_and_inside_m
 from tests.support.comms.lines import (
     Arenas,
     crossed_and_inside,
+    crossed_on_floor,
     indexed,
+    is_blocked_on_floor,
     touches_any,
     touches_any_on_torus,
 )
@@ -64,7 +66,7 @@ def test_line_of_sight_by_cells_equals_a_test_of_every_obstacle(arenas: Arenas, 
     arrays, index = obstacle_arrays(arenas), indexed(arenas, SIZE_M)
     for arena in range(len(arenas)):
         for line in lines(seed, reach).tolist():
-            assert is_blocked(index, arena, *line, 0.0, 0.0) == touches_any(arrays, arena, *line)
+            assert is_blocked_on_floor(index, arena, *line) == touches_any(arrays, arena, *line)
 
 
 @given(MAPS, st.integers(0, 2**32 - 1))
@@ -72,16 +74,17 @@ def test_line_of_sight_on_a_torus_crosses_the_seam(arenas: Arenas, seed: int) ->
     arrays, index = obstacle_arrays(arenas), indexed(arenas, SIZE_M)
     for arena in range(len(arenas)):
         for line in lines(seed, 1.0).tolist():
-            assert is_blocked(index, arena, *line, *SIZE_M) == touches_any_on_torus(arrays, arena, *line, SIZE_M)
+            assert is_blocked_on_floor(index, arena, *line, *SIZE_M) == touches_any_on_torus(
+                arrays, arena, *line, SIZE_M
+            )
 
 
 @given(MAPS, st.integers(0, 2**32 - 1), st.sampled_from([0.3, 1.0, 8.0]))
 def test_wall_lengths_add_up_in_the_order_of_obstacles(arenas: Arenas, seed: int, reach: float) -> None:
     arrays, index = obstacle_arrays(arenas), indexed(arenas, SIZE_M)
-    entered = np.full((len(index.shape), 2), np.nan)  # whatever an earlier line left
     for arena in range(len(arenas)):
         for line in lines(seed, reach).tolist():
-            assert crossed_and_inside_m(index, entered, arena, *line) == crossed_and_inside(arrays, arena, *line)
+            assert crossed_on_floor(index, arena, *line) == crossed_and_inside(arrays, arena, *line)
 
 
 def test_line_of_sight_in_a_large_map_equals_a_test_of_every_box() -> None:
@@ -89,10 +92,10 @@ def test_line_of_sight_in_a_large_map_equals_a_test_of_every_box() -> None:
     positions, turns = rng.uniform(-20.0, 20.0, (2000, 2)).tolist(), rng.uniform(-3.0, 3.0, 2000).tolist()
     boxes = tuple(Obstacle("box", x, y, turn, size_m=(0.3, 0.1)) for (x, y), turn in zip(positions, turns, strict=True))
     arrays, index = obstacle_arrays((boxes,)), indexed((boxes,), (40.0, 40.0))
-    entered, blocked, inside_m = np.empty((2000, 2)), 0, 0.0
+    blocked, inside_m = 0, 0.0
     for x, y, dx, dy in rng.uniform([-20.0, -20.0, -5.0, -5.0], [20.0, 20.0, 5.0, 5.0], (40, 4)).tolist():
         line = x, y, x + dx, y + dy
-        is_shut, walls = is_blocked(index, 0, *line, 0.0, 0.0), crossed_and_inside_m(index, entered, 0, *line)
+        is_shut, walls = is_blocked_on_floor(index, 0, *line), crossed_on_floor(index, 0, *line)
         assert is_shut == touches_any(arrays, 0, *line)
         assert walls == crossed_and_inside(arrays, 0, *line)
         blocked, inside_m = blocked + is_shut, inside_m + walls[1]
@@ -106,12 +109,50 @@ def test_obstacle_index_follows_only_movable_obstacles(moves: bool) -> None:
     indices = ObstacleIndices(arrays, SIZE_M, 0.0, obstacles_move=moves)
     line = 2.0, -1.0, 2.0, 1.0
     before = indices.now()
-    assert not is_blocked(before, 0, *line, 0.0, 0.0)
+    assert not is_blocked_on_floor(before, 0, *line)
     assert indices.now() is before
     arrays.circle[0, 0] = 2.0
-    assert is_blocked(indices.now(), 0, *line, 0.0, 0.0) is moves
+    assert is_blocked_on_floor(indices.now(), 0, *line) is moves
 
 
-def test_flat_obstacles_block_a_radio() -> None:
-    flat = replace(Obstacle("cylinder", 0.0, 0.0, radius_m=0.5), height_m=0.0)
-    assert is_blocked(indexed(((flat,),), SIZE_M), 0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+def test_low_obstacles_block_a_radio_on_the_floor() -> None:
+    low = replace(Obstacle("cylinder", 0.0, 0.0, radius_m=0.5), height_m=1e-3)
+    assert is_blocked_on_floor(indexed(((low,),), SIZE_M), 0, -1.0, 0.0, 1.0, 0.0)
+
+
+def depth(obstacle: Obstacle, points: FloatArray) -> FloatArray:
+    """How far each point (k, 3) is from an obstacle in m, from its rim or its top; below 0 within it."""
+    apart = points[:, :2] - (obstacle.x_m, obstacle.y_m)
+    c, s = np.cos(obstacle.heading_rad), np.sin(obstacle.heading_rad)
+    along, across = c * apart[:, 0] + s * apart[:, 1], c * apart[:, 1] - s * apart[:, 0]
+    beyond = np.hypot(along, across) - obstacle.radius_m
+    if obstacle.shape == "box":
+        beyond = np.maximum(np.abs(along) - obstacle.size_m[0] / 2, np.abs(across) - obstacle.size_m[1] / 2)
+    return np.maximum(beyond, points[:, 2] - obstacle.height_m)
+
+
+def test_lines_in_space_enter_obstacles_where_points_along_them_do() -> None:
+    """Against points along each line: the obstacles on it, and the length inside them."""
+    placed = (
+        Obstacle("cylinder", -1.0, 0.5, radius_m=0.6, height_m=0.7),
+        Obstacle("box", 1.0, 0.0, 0.4, size_m=(0.5, 2.0), height_m=1.2),
+        Obstacle("box", 0.0, -1.0, -0.2, size_m=(2.0, 0.3)),
+    )
+    index, entered, rng = indexed((placed,), SIZE_M), np.empty((3, 2)), np.random.default_rng(4)
+    shares, overflown = np.linspace(0.0, 1.0, 20_001)[:, None], 0
+    for a, b in rng.uniform([-3.0, -2.0, 0.0], [3.0, 2.0, 1.6], (200, 2, 3)):
+        points = a + shares * (b - a)
+        depths = [depth(obstacle, points) for obstacle in placed]
+        if min(abs(min(each)) for each in depths) < 1e-3:  # within that of a rim the points might miss it
+            continue
+        on_line = [bool((each < 0.0).any()) for each in depths]
+        inside_m = sum(float((each < 0.0).mean()) for each in depths) * np.linalg.norm(b - a)
+        for ends in ((a, b), (b, a)):
+            ax, ay, az, bx, by, bz = np.concatenate(ends).tolist()
+            assert is_blocked(index, 0, ax, ay, az, bx, by, bz, 0.0, 0.0) == any(on_line)
+            crossed, length_m = crossed_and_inside_m(index, entered, 0, ax, ay, az, bx, by, bz)
+            assert crossed == sum(on_line)
+            assert length_m == pytest.approx(inside_m, abs=1e-3)
+        flat = [bool((depth(replace(each, height_m=np.inf), points) < 0.0).any()) for each in placed]
+        overflown += sum(flat) - sum(on_line)
+    assert overflown > 20

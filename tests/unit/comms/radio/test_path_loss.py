@@ -9,9 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
-from swarmwire.comms.base.geometry.robot_index import Grid, grid_over, sort
+from swarmwire.comms.base.geometry.robot_index import grid_over, sort
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.path_loss_models import (
     Friis,
@@ -23,10 +22,10 @@ from swarmwire.comms.radio.config.path_loss_models import (
 )
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.propagation.decibels import from_db
-from swarmwire.comms.radio.propagation.obstruction import bodies_between, crossed_and_inside_m, is_on_line, wall_loss_db
+from swarmwire.comms.radio.propagation.obstruction import BodyParams, bodies_between, is_on_line, wall_loss_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db, reach_m, rssi_dbm
 from swarmwire.comms.radio.reception.receiver import chunk_success, ieee802154
-from tests.support.comms.lines import indexed
+from tests.support.comms.lines import crossed_on_floor, indexed, is_blocked_on_floor
 
 getcontext().prec = 40
 PI = Decimal("3.1415926535897932384626433832795028841972")
@@ -197,7 +196,7 @@ def test_path_loss_model_has_default_parameters_and_a_unit_disk_none():
 
 
 def through(obstacles: ObstacleIndex, *line: float, arena: int = 0) -> tuple[int, float]:
-    return crossed_and_inside_m(obstacles, np.empty((len(obstacles.shape), 2)), arena, *line)
+    return crossed_on_floor(obstacles, arena, *line)
 
 
 @pytest.mark.parametrize(
@@ -227,7 +226,7 @@ def test_wall_chords_are_exact(line: tuple[float, ...], crossed: int, inside_m: 
 
 
 def test_wall_loss_counts_obstacles_and_metres_of_its_arena_and_overlaps_twice():
-    loss = wall_loss_db(ARENAS, np.empty((5, 2)), 0, 5.0, 3.0, -2.0, 0.0, 8.0, 0.0)
+    loss = wall_loss_db(ARENAS, np.empty((5, 2)), 0, 5.0, 3.0, -2.0, 0.0, 0.0, 8.0, 0.0, 0.0)
     assert loss == pytest.approx(2 * 5.0 + 4.0 * 3.0, rel=1e-12)
     assert through(ARENAS, -2.0, 0.0, 8.0, 0.0, arena=1) == (0, 0.0)
     assert through(ARENAS, -2.0, 0.0, 8.0, 0.0, arena=2) == (2, pytest.approx(4.0, rel=1e-12))
@@ -251,7 +250,7 @@ def test_line_with_a_wall_chord_is_blocked(ax: float, ay: float, bx: float, by: 
     crossed, inside_m = through(ARENAS, ax, ay, bx, by)
     assert inside_m <= math.hypot(bx - ax, by - ay) + 1e-12
     assume(inside_m == 0.0 or inside_m > 1e-9)  # `is_blocked` has other roundings
-    assert not crossed or is_blocked(ARENAS, 0, ax, ay, bx, by, 0.0, 0.0)
+    assert not crossed or is_blocked_on_floor(ARENAS, 0, ax, ay, bx, by)
 
 
 @given(COORDINATES, COORDINATES, COORDINATES, COORDINATES, st.floats(-math.pi, math.pi), COORDINATES, COORDINATES)
@@ -271,19 +270,19 @@ def test_wall_chords_are_invariant_under_rigid_motion(ax, ay, bx, by, turn, dx, 
     assert moved_m == pytest.approx(original_m, abs=1e-6)
 
 
-def sorted_grid(x: FloatArray, y: FloatArray, cell_m: float, arenas: int) -> Grid:
+def bodies_on_floor(x: FloatArray, y: FloatArray, radius_m: FloatArray, cell_m: float, arenas: int) -> BodyParams:
     grid = grid_over((10.0, 10.0), cell_m, arenas, len(x), clamps=True)
     sort(grid, np.column_stack([x, y]).reshape(arenas, -1, 2), np.ones(arenas, np.bool_))
-    return grid
+    height_m = np.full(len(x), 0.1)
+    return BodyParams(x, y, np.zeros(len(x)), radius_m, height_m, float(radius_m.max()), grid, len(x) // arenas)
 
 
 def test_bodies_on_the_line_are_counted_but_not_its_ends():
     x, y = np.array([0.0, 1.0, 2.0, 3.0, 1.5, 4.0]), np.array([0.0, 0.05, 0.2, 0.0, -0.09, 0.0])
-    grid = sorted_grid(x, y, 5.0, 1)
-    radius_m = np.full(6, 0.1)
+    bodies = bodies_on_floor(x, y, np.full(6, 0.1), 5.0, 1)
     # Robot 1 and robot 4 are on it, robot 2 is beside it, robot 5 behind it.
     a, b = np.array([0, 3, 0]), np.array([3, 0, 1])
-    assert bodies_between(x, y, radius_m, grid, 6, a, b).tolist() == [2, 2, 0]
+    assert bodies_between(bodies, a, b).tolist() == [2, 2, 0]
 
 
 @pytest.mark.parametrize("cell_m", [0.2, 1.0, 30.0])
@@ -292,12 +291,12 @@ def test_bodies_by_grid_equal_a_test_of_all(cell_m: float):
     arenas, robots = 2, 60
     x, y = draws.uniform(-5.5, 5.5, (2, arenas * robots))
     radius_m = draws.uniform(0.05, 0.4, arenas * robots)
-    grid = sorted_grid(x, y, cell_m, arenas)
+    bodies = bodies_on_floor(x, y, radius_m, cell_m, arenas)
     pairs, expected = draws.integers(0, robots, (200, 2)) + robots * draws.integers(0, arenas, (200, 1)), []
     for a, b in pairs:
         others = [k for k in range(a - a % robots, a - a % robots + robots) if k not in (a, b)]
         expected.append(sum(is_on_line(x[a], y[a], x[b], y[b], x[k], y[k], radius_m[k]) for k in others))
-    assert bodies_between(x, y, radius_m, grid, robots, *pairs.T.copy()).tolist() == expected
+    assert bodies_between(bodies, *pairs.T.copy()).tolist() == expected
     assert sum(expected) > 100
 
 

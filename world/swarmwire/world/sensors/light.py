@@ -103,7 +103,8 @@ def _add_lights(value, start, angle, robots, widest_m, obstacles, lights):
             distance = np.sqrt(dx * dx + dy * dy)
             if distance > RANGE_INTENSITIES * intensity:
                 continue
-            if obstacle_between(obstacles, arena, x, y, to_x, to_y, robots.bottom_m[robot]):
+            bottom_m = robots.bottom_m[robot]
+            if obstacle_between(obstacles, arena, x, y, bottom_m, to_x, to_y, bottom_m):
                 continue
             if robot_between(robots, widest_m, arena, robot, x, y, to_x, to_y):
                 continue

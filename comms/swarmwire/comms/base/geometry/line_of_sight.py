@@ -1,6 +1,7 @@
-"""Straight lines over the floor: the cells along them, and the obstacles that touch them. Compiled.
+"""Straight lines in space: the cells of the floor below them, and the obstacles that touch them. Compiled.
 
-The cost grows with the cells along a line, not with the obstacles of its arena.
+Obstacles stand on the floor: one touches a line only where the line is below its top. The cost grows with the cells
+along a line, not with the obstacles of its arena.
 """
 
 from typing import Any
@@ -13,7 +14,6 @@ from swarmwire.comms.base.geometry.robot_index import Grid
 from swarmwire.comms.base.kernels import kernel
 
 MARGIN_M = 1e-9  # a line along the border of two cells is in both
-ANY_HEIGHT_M = -np.inf  # obstacles of any height are above it
 
 
 @kernel()
@@ -84,8 +84,18 @@ def is_beside(x: float, y: float, to_x: float, to_y: float, obstacles: ObstacleI
 
 
 @kernel()
-def obstacle_between(obstacles: ObstacleIndex, arena: int, x: float, y: float, to_x: float, to_y: float, low_m: float):
-    """Return True if an obstacle higher than `low_m` touches the line from x, y to to_x, to_y."""
+def length_below_m(length_m: float, z: float, to_z: float, top_m: Any):
+    """Return the length over the floor of the part below a top higher than z, of a line that rises from z to to_z."""
+    return length_m if top_m >= to_z else length_m * ((top_m - z) / (to_z - z))
+
+
+@kernel()
+def obstacle_between(
+    obstacles: ObstacleIndex, arena: int, x: float, y: float, z: float, to_x: float, to_y: float, to_z: float
+):
+    """Return True if an obstacle touches the line from (x, y, z) to (to_x, to_y, to_z) below its top; all in m."""
+    if to_z < z:  # from the lower end
+        x, y, z, to_x, to_y, to_z = to_x, to_y, to_z, x, y, z
     dx, dy = to_x - x, to_y - y
     distance_m = np.sqrt(dx * dx + dy * dy)
     if distance_m == 0.0:
@@ -98,25 +108,37 @@ def obstacle_between(obstacles: ObstacleIndex, arena: int, x: float, y: float, t
             c = cell_number(cells, arena, column, row)
             for at in range(cells.start[c], cells.start[c + 1]):
                 k = cells.item[at]
-                if obstacles.shape[k, 3] <= low_m or is_beside(x, y, to_x, to_y, obstacles, k):
+                top_m = obstacles.shape[k, 3]
+                if top_m <= z or is_beside(x, y, to_x, to_y, obstacles, k):
                     continue
-                if ray_to_obstacle(x, y, dx, dy, obstacles, k) <= distance_m:
+                if ray_to_obstacle(x, y, dx, dy, obstacles, k) <= length_below_m(distance_m, z, to_z, top_m):
                     return True
     return False
 
 
 @kernel(from_python=True)
-def is_blocked(obstacles: ObstacleIndex, arena: int, x0: Any, y0: Any, x1: Any, y1: Any, wrap_x: float, wrap_y: float):
-    """Return True if an obstacle of the arena touches the shortest line between two points.
+def is_blocked(
+    obstacles: ObstacleIndex,
+    arena: int,
+    x0: Any,
+    y0: Any,
+    z0: Any,
+    x1: Any,
+    y1: Any,
+    z1: Any,
+    wrap_x: float,
+    wrap_y: float,
+):
+    """Return True if an obstacle of the arena touches the shortest line between two points below its top.
 
-    `obstacles` is an obstacle index without images, `wrap_x` and `wrap_y` are the sides of a torus in m; 0: the arena
-    ends there. A line over the edge is tested on both sides.
+    Nothing is between two points one above the other. `obstacles` is an obstacle index without images, `wrap_x` and
+    `wrap_y` are the sides of a torus in m; 0: the arena ends there. A line over the edge is tested on both sides.
     """
     over_x, over_y = to_nearest(x1 - x0, wrap_x), to_nearest(y1 - y0, wrap_y)
     x1, y1 = x1 + over_x, y1 + over_y
     for i in range(2 if over_x != 0.0 else 1):
         for j in range(2 if over_y != 0.0 else 1):
             back_x, back_y = i * over_x, j * over_y
-            if obstacle_between(obstacles, arena, x0 - back_x, y0 - back_y, x1 - back_x, y1 - back_y, ANY_HEIGHT_M):
+            if obstacle_between(obstacles, arena, x0 - back_x, y0 - back_y, z0, x1 - back_x, y1 - back_y, z1):
                 return True
     return False

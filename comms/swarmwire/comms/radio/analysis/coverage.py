@@ -1,6 +1,6 @@
 """Coverage of a radio: mean power and delivery of lone packets between two points, as a map or by distance.
 
-Propagation and reception are those of the medium, without other robots.
+Propagation and reception are those of the medium, without other robots; all points are on the floor.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -120,7 +120,7 @@ def _mean_loss_db(mean_loss, waves, obstacles, start, end):
         ax, ay = start[i]
         bx, by = end[i]
         distance_m = math.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
-        loss_db[i] = loss_between_db(mean_loss, waves, obstacles, entered, 0, distance_m, ax, ay, bx, by)
+        loss_db[i] = loss_between_db(mean_loss, waves, obstacles, entered, 0, distance_m, ax, ay, 0.0, bx, by, 0.0)
     return loss_db
 
 
@@ -128,7 +128,7 @@ def _mean_loss_db(mean_loss, waves, obstacles, start, end):
 def _blocked(obstacles, start, end):
     blocked = np.zeros(len(start), np.bool_)
     for i in range(len(start)):
-        blocked[i] = is_blocked(obstacles, 0, start[i, 0], start[i, 1], end[i, 0], end[i, 1], 0.0, 0.0)
+        blocked[i] = is_blocked(obstacles, 0, start[i, 0], start[i, 1], 0.0, end[i, 0], end[i, 1], 0.0, 0.0, 0.0)
     return blocked
 
 

@@ -152,14 +152,14 @@ def refuse_negative(delays: Delays, where: str, key: str) -> None:
 
 @dataclass(frozen=True)
 class RangeMeasure:
-    """A receiver measures the distance to the sender, in m, between centres."""
+    """A receiver measures the distance in space to the sender, in m, from antenna to antenna."""
 
     noise_m: float = parameter(0.0, help="standard deviation of the error", unit="m", at_least=0)
 
 
 @dataclass(frozen=True)
 class BearingMeasure:
-    """A receiver measures the direction to the sender in its own frame, in rad, positive to the left."""
+    """A receiver measures the direction to the sender in the plane, in its own frame, in rad, positive to the left."""
 
     noise_rad: float = parameter(0.0, help="standard deviation of the error", unit="rad", at_least=0)
 

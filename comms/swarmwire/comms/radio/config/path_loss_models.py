@@ -22,6 +22,8 @@ class LossCurve(NamedTuple):
     far_db: float
     far_slope_db: float  # per decade of distance
     absorption_db_per_m: float = 0.0
+    sender_height_m: float = 0.0  # of two-ray, for robots at height 0; 0: the model does not depend on heights
+    receiver_height_m: float = 0.0
 
 
 def straight(loss_db_at_1_m: float, slope_db: float, absorption_db_per_m: float = 0.0) -> LossCurve:
@@ -68,14 +70,23 @@ class TwoRay:
     """Friis up to the crossover d = 4 pi h1 h2 f / c, beyond it L(d) = 40 log10 d - 20 log10(h1 h2) dB, d and h in m.
 
     The model of ns-2 and ns-3 (T. S. Rappaport, Wireless Communications, 1996). Both lines meet at the crossover, which
-    is near: 4 m for antennas 0.2 m above the ground at 2.4 GHz.
+    is near: 4 m for antennas 0.2 m above the ground at 2.4 GHz. The height of a robot above the floor is added to that
+    of its antenna.
     """
 
     sender_height_m: float = parameter(
-        1.5, help="height of the sender's antenna above the ground", unit="m", above=0, at_most=1000
+        1.5,
+        help="height of the sender's antenna above its robot's lower side",
+        unit="m",
+        above=0,
+        at_most=1000,
     )
     receiver_height_m: float = parameter(
-        1.5, help="height of the receiver's antenna above the ground", unit="m", above=0, at_most=1000
+        1.5,
+        help="height of the receiver's antenna above its robot's lower side",
+        unit="m",
+        above=0,
+        at_most=1000,
     )
 
     def crossover_m(self, frequency_hz: float) -> float:
@@ -84,8 +95,11 @@ class TwoRay:
 
     def curve(self, frequency_hz: float) -> LossCurve:
         """Return the loss at this frequency."""
-        ground_db = -20.0 * portable.log10(self.sender_height_m * self.receiver_height_m)
-        return LossCurve(loss_at_1_m_db(frequency_hz), 20.0, self.crossover_m(frequency_hz), ground_db, 40.0)
+        h1, h2 = self.sender_height_m, self.receiver_height_m
+        ground_db = -20.0 * portable.log10(h1 * h2)
+        return LossCurve(
+            loss_at_1_m_db(frequency_hz), 20.0, self.crossover_m(frequency_hz), ground_db, 40.0, 0.0, h1, h2
+        )
 
 
 # Kind of building: distance coefficient N; floor penetration in dB for one floor, and for each further one.

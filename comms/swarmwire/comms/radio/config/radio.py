@@ -75,7 +75,7 @@ class Radio:
 
     range_m: float | None = parameter(
         None,
-        help="greatest distance to receivers, centre to centre, except on measured links; required by the unit disk",
+        help="greatest distance to receivers, in space, except on measured links; required by the unit disk",
         unit="m",
         above=0,
     )

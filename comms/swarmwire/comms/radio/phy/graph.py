@@ -48,7 +48,7 @@ class RadioGraph:
         )
 
     def edges(self, pose: FloatArray, alive: BoolArray, at_ns: int) -> IntArray:
-        """Return the edges, robot rows a < b, with the robots at `pose` (rows, 3); sorted, (e, 2).
+        """Return the edges, robot rows a < b, with the robots at `pose` (rows, 4); sorted, (e, 2).
 
         Measured values are those at `at_ns`.
         """

@@ -6,6 +6,8 @@ current poses; within a tick jammers only switch on and off.
 
 # pyright: basic, reportUnknownMemberType=false
 
+import math
+
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
@@ -38,7 +40,7 @@ class JammerTable:
         return len(self._jammers.arena) > 0
 
     def move(self, pose: FloatArray, propagation: PropagationParams) -> None:
-        """Recompute the powers for robots at `pose` (rows, 3) and the jammers of the active disruption."""
+        """Recompute the powers for robots at `pose` (rows, 4) and the jammers of the active disruption."""
         self._jammers = self._context.disruption.jammers
         if not self.anything:
             self._power_mw = np.empty((0, self._context.robots))
@@ -75,29 +77,31 @@ class JammerTable:
 def powers_of(
     jammers: Jammers, pose: FloatArray, robots: int, obstacles: ObstacleIndex, propagation: PropagationParams
 ) -> FloatArray:
-    """Return the power of each jammer at each robot of its arena in mW, robots at `pose` (rows, 3); (k, robots)."""
-    x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
-    return _powers(jammers, jammers.positions(pose), x, y, robots, obstacles, propagation)
+    """Return the power of each jammer at each robot of its arena in mW, robots at `pose` (rows, 4); (k, robots)."""
+    x, y, z = (np.ascontiguousarray(pose[:, column]) for column in (0, 1, 3))
+    return _powers(jammers, jammers.positions(pose), x, y, z, robots, obstacles, propagation)
 
 
 @njit()
-def _powers(jammers, position, x, y, robots, obstacles, propagation):
+def _powers(jammers, position, x, y, z, robots, obstacles, propagation):
     power_mw, entered = np.zeros((len(position), robots)), np.empty((len(obstacles.shape), 2))
     amplitude_db = propagation.amplitude_db if propagation.shadows else 0.0
     crossing_db = propagation.crossing_db if propagation.walls else 0.0
     inside_db_per_m = propagation.inside_db_per_m if propagation.walls else 0.0
     mean_loss = MeanLoss(propagation.curve, amplitude_db, crossing_db, inside_db_per_m)
     for j in range(len(position)):
-        arena, jx, jy = jammers.arena[j], position[j, 0], position[j, 1]
+        arena, jx, jy, jz = jammers.arena[j], position[j, 0], position[j, 1], position[j, 2]
         waves = propagation.field[arena]
         for i in range(robots):
             r = arena * robots + i
             if r == jammers.carrier[j]:
                 continue
-            if propagation.line_of_sight and is_blocked(obstacles, arena, jx, jy, x[r], y[r], 0.0, 0.0):
+            if propagation.line_of_sight and is_blocked(obstacles, arena, jx, jy, jz, x[r], y[r], z[r], 0.0, 0.0):
                 continue
-            distance_m = math_compiled.hypot(x[r] - jx, y[r] - jy)
-            loss = loss_between_db(mean_loss, waves, obstacles, entered, arena, distance_m, jx, jy, x[r], y[r])
+            over_floor_m, dz = math_compiled.hypot(x[r] - jx, y[r] - jy), z[r] - jz
+            distance_m = math.sqrt(over_floor_m * over_floor_m + dz * dz)
+            ends = jx, jy, jz, x[r], y[r], z[r]
+            loss = loss_between_db(mean_loss, waves, obstacles, entered, arena, distance_m, *ends)
             power_mw[j, i] = from_db(jammers.power_dbm[j] + propagation.receive_dbi[r] - loss)
     return power_mw
 

@@ -140,7 +140,7 @@ class LinkTable:
         self._context, self._line_of_sight, self._measured = context, LineOfSight.create(context), measured
         self.propagation, self._thresholds = propagation, thresholds
         rows = len(context.keys) * context.robots
-        self.pose = np.zeros((rows, 3))
+        self.pose = np.zeros((rows, 4))
         # Obstacles may be pushed, and measured strengths change by themselves.
         self._depends_on_poses_only = measured is None and self._line_of_sight is None and not propagation.walls
         self._is_new, self._running = True, context.running.copy()
@@ -149,7 +149,7 @@ class LinkTable:
         self.link, self.ranges = self._links(np.empty(0, LINK))
 
     def pairs_at(self, pose: FloatArray) -> Pairs:
-        """Pairs of robots at `pose` (rows, 3)."""
+        """Pairs of robots at `pose` (rows, 4)."""
         return self._pairs_at(pose, self.propagation)
 
     def _pairs_at(self, pose: FloatArray, propagation: PropagationParams) -> Pairs:

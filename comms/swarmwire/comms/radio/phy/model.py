@@ -36,7 +36,7 @@ from swarmwire.comms.radio.transmissions import Transmissions
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, SentPackets, TxStatuses
 
 EVERY_ROW = np.empty(0, np.bool_)
-Poses = dict[int, FloatArray]  # poses (rows, 3) by their number
+Poses = dict[int, FloatArray]  # poses (rows, 4) by their number
 
 
 class Reporter:
@@ -129,7 +129,7 @@ class SinrPhy(RadioModel):
         self._order, self._start = np.empty(0, np.int64), np.zeros(rows + 1, np.int64)
         self._is_new, self._next_ns, self._buffer = True, 0, result_buffer(MIN_CAPACITY)
         self._switch = tx_queue.switches_of(context.disruption)
-        self._pose_id, self._poses = 0, {0: np.zeros((rows, 3))}
+        self._pose_id, self._poses = 0, {0: np.zeros((rows, 4))}
         self._now_ns = self._poses_from_ns = self._last_rows = 0
         self._tx_status: list[TxStatuses] = []
 
@@ -139,7 +139,7 @@ class SinrPhy(RadioModel):
         return self._packets.queued.rows
 
     def set_poses(self, pose: FloatArray) -> None:
-        """Move the robots to `pose` (rows, 3)."""
+        """Move the robots to `pose` (rows, 4)."""
         self._pose_id, self._poses_from_ns = self._pose_id + 1, self._now_ns
         self._switch, self._next_ns = tx_queue.switches_of(self._context.disruption), 0
         # The stages need the poses of frames on air, and of the last attempt at a packet that may still fail.
@@ -159,7 +159,7 @@ class SinrPhy(RadioModel):
         self._was_jammed = self._jam.anything
 
     def expect(self, pose: FloatArray) -> None:
-        """Begin to compute the links of robots that will be at `pose` (rows, 3)."""
+        """Begin to compute the links of robots that will be at `pose` (rows, 4)."""
         self._links.expect(pose)
 
     def tune(self, at_ns: int, radio: Radio) -> None:

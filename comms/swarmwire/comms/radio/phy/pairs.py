@@ -1,8 +1,9 @@
 """Pairs of robots near enough to receive or to interfere, and the loss and fading gain between them.
 
 Power = transmit power + antenna gains - path loss - shadowing - walls - bodies + fading. All terms except the sender's
-power and the gains of events are equal in both directions and depend on poses only, so each pair is computed once. A
-pair is omitted if path loss alone, or all terms without fading, give less than the cut-off. Measured strengths replace
+power and the gains of events are equal in both directions and depend on poses only, so each pair is computed once.
+Distances are in space; the fields of shadowing and fading lie in the plane, and do not change with height. A pair is
+omitted if path loss alone, or all terms without fading, give less than the cut-off. Measured strengths replace
 modelled strengths.
 """
 
@@ -21,8 +22,8 @@ from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.propagation import fading, shadowing
 from swarmwire.comms.radio.propagation.fading import field_gain
-from swarmwire.comms.radio.propagation.obstruction import bodies_between, wall_loss_db
-from swarmwire.comms.radio.propagation.path_loss import loss_db
+from swarmwire.comms.radio.propagation.obstruction import BodyParams, bodies_between, wall_loss_db
+from swarmwire.comms.radio.propagation.path_loss import lifted, loss_db
 from swarmwire.comms.radio.propagation.shadowing import SUMS
 from swarmwire.comms.radio.stages.blocking import LineOfSight
 from swarmwire.comms.radio.traces import LinkTraces
@@ -49,29 +50,33 @@ def pairs_of(
     line_of_sight: LineOfSight | None = None,
     measured: "MeasuredLinks | None" = None,
 ) -> Pairs:
-    """Return all pairs above the cut-off of robots at `pose` (rows, 3), and all pairs of measured strength.
+    """Return all pairs above the cut-off of robots at `pose` (rows, 4), and all pairs of measured strength.
 
     Arenas that are not `running` (arenas,) have no pairs.
     """
-    x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
+    x, y, z = (np.ascontiguousarray(pose[:, column]) for column in (0, 1, 3))
     robots = len(x) // len(keys)
+    if propagation.curve.sender_height_m > 0.0:
+        propagation = propagation.up_to(float(z.max()))
     grid = robot_index.grid_over(size_m, propagation.reach_m, len(keys), len(x), clamps=True)
     robot_index.sort(grid, pose.reshape(len(keys), robots, pose.shape[1]), running)
     order = robot_index.rows_in_order(grid, len(keys), robots)
-    a, b, loss = _near(x, y, robots, grid, order, propagation)
+    a, b, loss = _near(x, y, z, robots, grid, order, propagation)
     if propagation.shadows:
         _add_shadows(loss, x, y, robots, order, propagation.field, propagation.amplitude_db, a, b)
     if propagation.walls:
-        _add_walls(loss, x, y, robots, obstacles.now(), propagation.crossing_db, propagation.inside_db_per_m, a, b)
+        _add_walls(loss, x, y, z, robots, obstacles.now(), propagation.crossing_db, propagation.inside_db_per_m, a, b)
     if propagation.bodies:
-        loss += propagation.body_db * bodies_between(x, y, propagation.radius_m, grid, robots, a, b)
+        radius_m, height_m = propagation.radius_m, propagation.height_m
+        bodies = BodyParams(x, y, z, radius_m, height_m, float(radius_m.max()), grid, robots)
+        loss += propagation.body_db * bodies_between(bodies, a, b)
     count = int(_above(propagation.min_dbm, propagation.send_dbm, propagation.receive_dbi, a, b, loss))
     a, b, loss = a[:count], b[:count], loss[:count]
     if measured is not None:
         a, b, loss = measured.with_unlisted(a, b, loss)
     gain = np.ones(len(a))
     if propagation.fades:
-        _fade(gain, x, y, robots, keys, order, propagation.scatter, propagation.fading_model, a, b)
+        _fade(gain, x, y, z, robots, keys, order, propagation.scatter, propagation.fading_model, a, b)
     blocked = np.zeros(len(a), np.bool_) if line_of_sight is None else line_of_sight.blocked(pose, a, b)
     pairs = Pairs(a, b, loss, loss, gain, blocked)
     return pairs if measured is None else _measured(pairs, measured)
@@ -89,15 +94,15 @@ def _measured(pairs: Pairs, measured: "MeasuredLinks") -> Pairs:
 
 
 @njit(nogil=True)
-def _near(x, y, robots, grid, order, propagation):
+def _near(x, y, z, robots, grid, order, propagation):
     """Return pairs above the cut-off by path loss alone, with a margin for shadowing, and this loss in dB."""
     ahead = np.empty((len(order), 2, 2), np.uint64)
     capacity = _look_ahead(ahead, x, y, robots, grid, order)
     a, b, loss = np.empty(capacity, np.int64), np.empty(capacity, np.int64), np.empty(capacity)
     near, square_distance_m2 = np.empty(2 * len(x), np.uint64), np.empty(2 * len(x))
     near_loss_db = np.empty(2 * len(x))
-    sorted_x, sorted_y = x[order], y[order]
-    count = _join(a, b, loss, order, sorted_x, sorted_y, ahead, propagation, near, square_distance_m2, near_loss_db)
+    sorted_xyz = x[order], y[order], z[order]
+    count = _join(a, b, loss, order, *sorted_xyz, ahead, propagation, near, square_distance_m2, near_loss_db)
     return a[:count], b[:count], loss[:count]
 
 
@@ -120,8 +125,8 @@ def _look_ahead(ahead, x, y, robots, grid, order):
 
 
 @kernel()
-def _join(a, b, loss, order, x, y, ahead, propagation, near, square_distance_m2, near_loss_db):
-    """Write the pairs and return their number; `x` and `y` are in grid order."""
+def _join(a, b, loss, order, x, y, z, ahead, propagation, near, square_distance_m2, near_loss_db):
+    """Write the pairs and return their number; `x`, `y` and `z` are in grid order."""
     count, square_m2, curve = np.uint64(0), propagation.reach_m * propagation.reach_m, propagation.curve
     send_dbm, receive_dbi, min_dbm = (
         propagation.send_dbm,
@@ -132,12 +137,14 @@ def _join(a, b, loss, order, x, y, ahead, propagation, near, square_distance_m2,
         candidates, s = np.uint64(0), order[i]
         for j in range(2):
             for k in range(ahead[i, j, 0], ahead[i, j, 1]):
-                dx, dy = x[k] - x[i], y[k] - y[i]
+                dx, dy, dz = x[k] - x[i], y[k] - y[i], z[k] - z[i]
                 # Branchless: write first, then advance for a candidate; branches would be mispredicted too often.
-                near[candidates], square_distance_m2[candidates] = k, dx * dx + dy * dy
+                near[candidates], square_distance_m2[candidates] = k, dx * dx + dy * dy + dz * dz
                 candidates += np.uint64(square_distance_m2[candidates] <= square_m2)
         for k in range(candidates):  # a loop of its own is vectorised
             near_loss_db[k] = loss_db(curve, math.sqrt(square_distance_m2[k]))
+        for k in range(candidates if curve.sender_height_m > 0.0 else np.uint64(0)):
+            near_loss_db[k] = loss_db(lifted(curve, z[i], z[near[k]]), math.sqrt(square_distance_m2[k]))
         for k in range(candidates):
             r = order[near[k]]
             a[count], b[count], loss[count] = min(s, r), max(s, r), near_loss_db[k]
@@ -164,11 +171,12 @@ def _add_between(loss, x, y, robots, field, amplitude_db, a, b, height, parts):
 
 
 @njit()
-def _add_walls(loss, x, y, robots, obstacles, crossing_db, inside_db_per_m, a, b):
+def _add_walls(loss, x, y, z, robots, obstacles, crossing_db, inside_db_per_m, a, b):
     entered = np.empty((len(obstacles.shape), 2))
     for i in range(len(a)):
         s, r = a[i], b[i]
-        loss[i] += wall_loss_db(obstacles, entered, s // robots, crossing_db, inside_db_per_m, x[s], y[s], x[r], y[r])
+        ends = x[s], y[s], z[s], x[r], y[r], z[r]
+        loss[i] += wall_loss_db(obstacles, entered, s // robots, crossing_db, inside_db_per_m, *ends)
 
 
 @kernel(from_python=True, nogil=True)
@@ -190,22 +198,22 @@ def _max_dbm(send_dbm, receive_dbi, s, r):
 
 
 @njit(nogil=True)
-def _fade(gain, x, y, robots, keys, rows, scatter, fading_model, a, b):
+def _fade(gain, x, y, z, robots, keys, rows, scatter, fading_model, a, b):
     arriving, number = np.zeros((len(x), 4, fading.WAVES), np.float32), np.zeros(len(x), np.uint64)
     for r in rows:
         fading.waves_at(scatter[r // robots], x[r], y[r], arriving[r])
         number[r] = fading.robot_number(keys[r // robots], r % robots)
     parts = np.empty((2, SUMS), np.float32)
-    _gains(gain, x, y, arriving, number, fading_model, a, b, parts[0], parts[1])
+    _gains(gain, x, y, z, arriving, number, fading_model, a, b, parts[0], parts[1])
 
 
 @kernel()
-def _gains(gain, x, y, arriving, number, fading_model, a, b, real, imaginary):
+def _gains(gain, x, y, z, arriving, number, fading_model, a, b, real, imaginary):
     for i in range(len(a)):
         s, r = a[i], b[i]
         h = fading.scattered_field(fading.pair_signs(number[s], number[r]), arriving, s, r, real, imaginary)
-        dx, dy = x[r] - x[s], y[r] - y[s]
-        gain[i] = field_gain(fading_model, h, math.sqrt(dx * dx + dy * dy))
+        dx, dy, dz = x[r] - x[s], y[r] - y[s], z[r] - z[s]
+        gain[i] = field_gain(fading_model, h, math.sqrt(dx * dx + dy * dy + dz * dz))
 
 
 class MeasuredLinks:

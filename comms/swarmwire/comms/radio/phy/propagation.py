@@ -4,6 +4,7 @@ Sensitivity is the least mean power of a receiver in range. A signal below the c
 interference.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from swarmwire.comms.radio.config.phy import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.propagation.fading import FadingModel, fading_model, scatter_waves
-from swarmwire.comms.radio.propagation.path_loss import reach_m
+from swarmwire.comms.radio.propagation.path_loss import lifted, reach_m
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves
 from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sensitivity_dbm
 
@@ -50,7 +51,7 @@ def sensitivity_of(radio: Radio) -> float:
 def range_of(radio: Radio) -> float | None:
     """Return the nominal range in m: the distance at which path loss alone reaches the sensitivity, or the unit disk's.
 
-    It is at most `range_m`.
+    It is at most `range_m`, and that of robots on the floor.
     """
     if not radio.is_phy:
         return radio.range_m
@@ -74,7 +75,9 @@ class PropagationParams(NamedTuple):
     send_dbm: FloatArray  # (rows,) transmit power and antenna gain
     receive_dbi: FloatArray  # (rows,) antenna gain
     curve: LossCurve
-    reach_m: float  # no link is longer
+    max_loss_db: float  # no link has a greater path loss
+    range_m: float  # no link is longer; inf: any distance
+    reach_m: float  # the least of both, between robots on the floor
     min_dbm: float  # no link is weaker, without fading
     spread_db: float  # shadowing gain that may offset path loss
     shadows: bool
@@ -87,9 +90,14 @@ class PropagationParams(NamedTuple):
     bodies: bool
     body_db: float
     radius_m: FloatArray  # (rows,)
+    height_m: FloatArray  # (rows,)
     fades: bool
     fading_model: FadingModel
     scatter: FloatArray  # (arenas, 5, n), see `scatter_waves`
+
+    def up_to(self, z: float) -> "PropagationParams":
+        """Return the parameters for robots at heights up to z in m: the reach of two-ray grows with the heights."""
+        return self._replace(reach_m=_reach_m(lifted(self.curve, z, z), self.max_loss_db, self.range_m))
 
 
 def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationParams:
@@ -101,12 +109,15 @@ def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationP
     model = fading_model(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
     spread_db = max(SHADOWING_MARGIN * shadowing.deviation_db - radio.cut_off_db, 0.0) if shadowing else 0.0
     best_dbm = float(send_dbm.max() + receive_dbi.max())
-    far_m = float(reach_m(curve, best_dbm - cut_off_dbm(radio) + spread_db))
+    max_loss_db = best_dbm - cut_off_dbm(radio) + spread_db
+    range_m = math.inf if radio.range_m is None else radio.range_m
     return PropagationParams(
         send_dbm=send_dbm,
         receive_dbi=receive_dbi,
         curve=curve,
-        reach_m=far_m if radio.range_m is None else min(far_m, radio.range_m),
+        max_loss_db=max_loss_db,
+        range_m=range_m,
+        reach_m=_reach_m(curve, max_loss_db, range_m),
         min_dbm=cut_off_dbm(radio),
         spread_db=spread_db,
         shadows=shadowing is not None,
@@ -119,10 +130,15 @@ def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationP
         bodies=bodies is not None,
         body_db=(bodies or Bodies()).crossing_db,
         radius_m=context.radius_m,
+        height_m=context.height_m,
         fades=fading is not None,
         fading_model=model,
         scatter=np.array([scatter_waves(key, model.wave_number) for key in keys]),
     )
+
+
+def _reach_m(curve: LossCurve, max_loss_db: float, range_m: float) -> float:
+    return min(float(reach_m(curve, max_loss_db)), range_m)
 
 
 def _antennas_of(radio: Radio, context: ChannelContext) -> tuple[FloatArray, FloatArray]:

@@ -14,7 +14,7 @@ The directions are a lattice of N points over both circles, rotated by keyed amo
 a keyed phase, all by the arena's key. Each unordered pair of robots gives each wave a sign, by keyed numbers of both
 robots, which makes pairs independent. So the waves at a robot are computed once for all its links. |h|^2 is
 exponential up to O(1/N): E g^2 = 2 - 1/N, its distribution is within 0.004 of the exponential's, and it never exceeds N
-(15 dB).
+(15 dB). Waves travel in the plane: height does not change h, only the phase of Rice's direct wave.
 """
 
 import math

@@ -1,17 +1,24 @@
 """Obstruction: loss of a link in walls, per obstacle and per metre inside, and the robots on a link's line.
 
-Walls follow the multi-wall model (COST 231 final report, 1999) with exact chords through the obstacles of the arena.
-Radios that obstacles block use `line_of_sight` instead.
+A link is a straight line in space between antennas at the heights z. An obstacle counts where the line is below its
+top, the body of a robot where the line is between the body's lower side, at the robot's z, and its top. Walls follow
+the multi-wall model (COST 231 final report, 1999) with exact chords through the obstacles of the arena. Radios that
+obstacles block use `line_of_sight` instead.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry import robot_index
-from swarmwire.comms.base.geometry.line_of_sight import cell_number, columns_to_obstacles, rows_to_obstacles
+from swarmwire.comms.base.geometry.line_of_sight import (
+    cell_number,
+    columns_to_obstacles,
+    length_below_m,
+    rows_to_obstacles,
+)
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
 from swarmwire.comms.base.geometry.robot_index import Grid
 from swarmwire.comms.base.kernels import kernel, njit
@@ -28,31 +35,37 @@ def wall_loss_db(
     inside_db_per_m: float,
     ax: float,
     ay: float,
+    az: float,
     bx: float,
     by: float,
+    bz: float,
 ):
     """Return the loss in walls between two points in m, in dB; equal both ways to the last bit.
 
     `obstacles` and `entered` are those of `crossed_and_inside_m`.
     """
-    crossed, inside_m = crossed_and_inside_m(obstacles, entered, arena, ax, ay, bx, by)
+    crossed, inside_m = crossed_and_inside_m(obstacles, entered, arena, ax, ay, az, bx, by, bz)
     return crossed * crossing_db + inside_m * inside_db_per_m
 
 
 @kernel(from_python=True)
-def crossed_and_inside_m(obstacles: ObstacleIndex, entered: AnyArray, arena: int, ax: Any, ay: Any, bx: Any, by: Any):
+def crossed_and_inside_m(
+    obstacles: ObstacleIndex, entered: AnyArray, arena: int, ax: Any, ay: Any, az: Any, bx: Any, by: Any, bz: Any
+):
     """Return the number of the arena's obstacles that the line between two points enters, and its length inside in m.
 
-    `obstacles` is an obstacle index, `entered` a buffer (obstacles, 2). A line that only touches an obstacle does not
-    enter it. Overlapping obstacles both count.
+    `obstacles` is an obstacle index, `entered` a buffer (obstacles, 2). A line that only touches an obstacle, or that
+    passes over it, does not enter it; nothing is between two points one above the other. Overlapping obstacles both
+    count.
     """
-    if (bx, by) < (ax, ay):  # one order of the ends: both directions agree to the last bit
-        ax, ay, bx, by = bx, by, ax, ay
-    dx, dy = bx - ax, by - ay
-    length = math.sqrt(dx * dx + dy * dy)
+    if (bz, bx, by) < (az, ax, ay):  # from the lower end; one order of the ends: both directions agree to the last bit
+        ax, ay, az, bx, by, bz = bx, by, bz, ax, ay, az
+    dx, dy, dz = bx - ax, by - ay, bz - az
+    length = math.sqrt(dx * dx + dy * dy)  # over the floor
     crossed, inside_m, cells = 0, 0.0, obstacles.cells
     if length == 0.0:
         return crossed, inside_m
+    stretch = math.sqrt(dx * dx + dy * dy + dz * dz) / length  # length in space / over the floor
     dx, dy = dx / length, dy / length
     first, last = columns_to_obstacles(obstacles, arena, ax, ay, bx, by)
     for column in range(first, last + 1):
@@ -61,9 +74,13 @@ def crossed_and_inside_m(obstacles: ObstacleIndex, entered: AnyArray, arena: int
             c = cell_number(cells, arena, column, row)
             for i in range(cells.start[c], cells.start[c + 1]):
                 k = cells.item[i]
-                chord_m = chord_in_obstacle(ax, ay, dx, dy, length, obstacles, k)
+                top_m = obstacles.shape[k, 3]
+                if top_m <= az:
+                    continue
+                below_m = length_below_m(length, az, bz, top_m)
+                chord_m = chord_in_obstacle(ax, ay, dx, dy, below_m, obstacles, k)
                 if chord_m > 0.0:
-                    crossed = _insert(entered, crossed, k, chord_m)
+                    crossed = _insert(entered, crossed, k, chord_m * stretch)
     for i in range(crossed):  # sorted by obstacle, not by cell: the last bit of the sum depends on the order
         inside_m += entered[i, 1]
     return crossed, inside_m
@@ -123,37 +140,66 @@ def chord_in_polygon(px: float, py: float, dx: float, dy: float, length: float, 
     return max(leave - enter, 0.0)
 
 
-@njit()
-def bodies_between(
-    x: FloatArray, y: FloatArray, radius_m: FloatArray, grid: Grid, robots: int, a: IntArray, b: IntArray
-):
-    """Return the number of other robots, dead or alive, whose disc each line between rows a and b crosses, (k,).
+class BodyParams(NamedTuple):
+    """The bodies of robots, upright cylinders, as input of kernels."""
 
-    Equal both ways. `x`, `y`, `radius_m` (rows,) in m; `grid` lists the `robots` of each arena, and clamps. The cost
-    grows with the cells in the line's bounding box.
+    x: FloatArray  # (rows,)
+    y: FloatArray  # (rows,)
+    z: FloatArray  # (rows,) height of the lower side
+    radius_m: FloatArray  # (rows,)
+    height_m: FloatArray  # (rows,) from the lower side to the top
+    max_radius_m: float
+    grid: Grid  # sorted; it clamps
+    robots: int  # robots per arena
+
+
+@njit()
+def bodies_between(bodies: BodyParams, a: IntArray, b: IntArray):
+    """Return the number of other robots, dead or alive, whose body each line between rows a and b crosses, (k,).
+
+    Equal both ways. The cost grows with the cells in the line's bounding box.
     """
-    counts, max_radius_m = np.empty(len(a), np.int64), radius_m.max()
+    counts = np.empty(len(a), np.int64)
     for i in range(len(a)):
-        counts[i] = bodies_on_line(x, y, radius_m, max_radius_m, grid, robots, min(a[i], b[i]), max(a[i], b[i]))
+        counts[i] = bodies_on_line(bodies, min(a[i], b[i]), max(a[i], b[i]))
     return counts
 
 
 @njit()
-def bodies_on_line(
-    x: AnyArray, y: AnyArray, radius_m: AnyArray, max_radius_m: float, grid: Grid, robots: int, a: int, b: int
-):
-    """Return the number of other robots whose disc the line between rows a < b crosses; `bodies_between` for one."""
+def bodies_on_line(bodies: Any, a: int, b: int):
+    """Return the number of other robots whose body the line between rows a < b crosses; `bodies_between` for one."""
+    x, y, grid, max_radius_m = bodies.x, bodies.y, bodies.grid, bodies.max_radius_m
     left, bottom = min(x[a], x[b]) - max_radius_m, min(y[a], y[b]) - max_radius_m
     right, top = max(x[a], x[b]) + max_radius_m, max(y[a], y[b]) + max_radius_m
-    arena, count = a // robots, 0
+    arena, count = a // bodies.robots, 0
     first_column, last_column = robot_index.column_of(grid, left), robot_index.column_of(grid, right)
     for j in range(robot_index.row_of(grid, bottom), robot_index.row_of(grid, top) + 1):
         first_cell = (arena * grid.ny + j) * grid.nx
         for i in range(grid.start[first_cell + first_column], grid.start[first_cell + last_column + 1]):
-            k = arena * robots + grid.item[i]
-            if k not in (a, b) and is_on_line(x[a], y[a], x[b], y[b], x[k], y[k], radius_m[k]):
+            k = arena * bodies.robots + grid.item[i]
+            if k not in (a, b) and _is_body_on_line(bodies, a, b, k):
                 count += 1
     return count
+
+
+@njit()
+def _is_body_on_line(bodies: Any, a: Any, b: Any, k: Any):
+    """Return True if the body of row k covers a point of the line between rows a and b."""
+    bottom_m, top_m = bodies.z[k], bodies.z[k] + bodies.height_m[k]
+    ax, ay, az, bx, by, bz = bodies.x[a], bodies.y[a], bodies.z[a], bodies.x[b], bodies.y[b], bodies.z[b]
+    if max(az, bz) < bottom_m or min(az, bz) >= top_m:
+        return False
+    first_x, first_y = _end_between(ax, ay, az, bx, by, bz, bottom_m, top_m)
+    last_x, last_y = _end_between(bx, by, bz, ax, ay, az, bottom_m, top_m)
+    return is_on_line(first_x, first_y, last_x, last_y, bodies.x[k], bodies.y[k], bodies.radius_m[k])
+
+
+@njit()
+def _end_between(x: Any, y: Any, z: Any, to_x: Any, to_y: Any, to_z: Any, bottom_m: Any, top_m: Any):
+    """Return the end x, y of a line, or the point nearest to it that is between two heights."""
+    height_m = min(max(z, bottom_m), top_m)
+    share = 0.0 if height_m == z else (height_m - z) / (to_z - z)
+    return x + share * (to_x - x), y + share * (to_y - y)
 
 
 @njit()

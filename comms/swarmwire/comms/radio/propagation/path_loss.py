@@ -3,6 +3,8 @@
 Every model is a curve of straight lines over log10 of distance, from `config/path_loss_models.py`. So one compiled
 function serves all models. Its inverse is exact, or by bisection in a medium that absorbs.
 
+Distances are in space. Only two-ray also depends on the heights of the antennas, by `lifted`.
+
 No model is valid in the near field of the antennas: below `NEAREST_M` the loss is that at `NEAREST_M`, as in ns-3's
 log-distance model, so that no link amplifies.
 """
@@ -29,6 +31,24 @@ def loss_db(curve: Any, distance_m: Any):
     at_1_m_db = curve.near_db if is_near else curve.far_db
     slope_db = curve.near_slope_db if is_near else curve.far_slope_db
     return at_1_m_db + slope_db * math_compiled.log10(distance_m) + absorbed_db
+
+
+@njit()
+def lifted(curve: Any, a_m: Any, b_m: Any):
+    """Return the loss curve between robots at the heights `a_m` and `b_m` in m: another one for two-ray alone.
+
+    The heights of its antennas are then a + h1 and b + h2. Where h1 and h2 differ, their product is the mean of both
+    directions, so that links stay equal both ways.
+    """
+    h1, h2 = curve.sender_height_m, curve.receiver_height_m
+    if h1 == 0.0:
+        return curve
+    a_m, b_m = max(a_m, 0.0), max(b_m, 0.0)
+    ratio = 0.5 * ((a_m + h1) * (b_m + h2) + (b_m + h1) * (a_m + h2)) / (h1 * h2)
+    far_db = curve.far_db - 20.0 * math_compiled.log10(ratio)
+    absorption_db_per_m = curve.absorption_db_per_m
+    near = curve.near_db, curve.near_slope_db, curve.break_m * ratio
+    return LossCurve(*near, far_db, curve.far_slope_db, absorption_db_per_m, h1, h2)
 
 
 @njit()
@@ -77,22 +97,24 @@ def loss_between_db(
     distance_m: float,
     ax: float,
     ay: float,
+    az: float,
     bx: float,
     by: float,
+    bz: float,
 ):
-    """Return the loss in dB between (ax, ay) and (bx, by), `distance_m` apart; all in m.
+    """Return the loss in dB between (ax, ay, az) and (bx, by, bz), `distance_m` apart in space; all in m.
 
     Path loss, shadowing and walls, without bodies and fading. `waves` (3, n) are those of the arena's field, walls are
     the arena's obstacles; `obstacles` and `entered` are those of `wall_loss_db`. The distance is a parameter, since the
     last bit of a run depends on its rounding. `phy/pairs.py` applies the same three steps to all pairs, but drops
     distant pairs after the first.
     """
-    loss = loss_db(mean_loss.curve, distance_m)
+    loss = loss_db(lifted(mean_loss.curve, az, bz), distance_m)
     if mean_loss.amplitude_db > 0.0:
         loss += shadowing_db(waves, mean_loss.amplitude_db, ax, ay, bx, by)
     crossing_db, inside_db_per_m = mean_loss.crossing_db, mean_loss.inside_db_per_m
     if crossing_db > 0.0 or inside_db_per_m > 0.0:
-        loss += wall_loss_db(obstacles, entered, arena, crossing_db, inside_db_per_m, ax, ay, bx, by)
+        loss += wall_loss_db(obstacles, entered, arena, crossing_db, inside_db_per_m, ax, ay, az, bx, by, bz)
     return loss
 
 

@@ -6,7 +6,8 @@ p(y)] = sigma^2 / (2 delta) exp(-|x - y| / delta), and on a link of length d fro
     X = 1/sqrt(d) * integral of p along the link, in dB;   Var X = sigma^2 (1 - delta/d (1 - exp(-d/delta))).
 
 Both directions agree, a robot that returns gets the same value, links through the same region are correlated, and the
-shadowing of short links vanishes. Var X tends to sigma^2 for links much longer than delta.
+shadowing of short links vanishes. Var X tends to sigma^2 for links much longer than delta. Heights have no effect: a
+link has the shadowing of its line over the floor.
 
 p is a sum of plane waves, sqrt(sigma^2 / (delta N)) cos(2 pi (k . x + phase)), whose integral has a closed form. The
 covariance is exact if the wave vectors follow its spectrum: |k| with F(k) = 1 - 1/sqrt(1 + (2 pi delta k)^2) (the

@@ -10,11 +10,11 @@ import numpy as np
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
-from swarmwire.comms.base.geometry.robot_index import Grid, grid_over, sort
+from swarmwire.comms.base.geometry.robot_index import grid_over, sort
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.context import ChannelContext
-from swarmwire.comms.radio.propagation.obstruction import bodies_on_line
+from swarmwire.comms.radio.propagation.obstruction import BodyParams, bodies_on_line
 from swarmwire.comms.radio.stages.stage import Stage
 from swarmwire.comms.robot.packets import Fate
 
@@ -36,12 +36,15 @@ def is_out_of_sight(params: Any, pose: AnyArray, sender: int, receiver: int):
         return False
     # From the lower row to the higher, so that both directions of a link agree to the last bit.
     a, b = min(sender, receiver), max(sender, receiver)
-    ax, ay, bx, by = pose[a, 0], pose[a, 1], pose[b, 0], pose[b, 1]
-    return is_blocked(params.obstacles, a // params.robots, ax, ay, bx, by, params.wrap_m[0], params.wrap_m[1])
+    ends = pose[a, 0], pose[a, 1], pose[a, 3], pose[b, 0], pose[b, 1], pose[b, 3]
+    return is_blocked(params.obstacles, a // params.robots, *ends, params.wrap_m[0], params.wrap_m[1])
 
 
 class LineOfSight(Stage):
-    """A link is blocked if an obstacle touches the straight line between the centres of sender and receiver."""
+    """A link is blocked if an obstacle touches the straight line between the antennas of sender and receiver.
+
+    The line is in space: an obstacle is in its way only where the line is below the obstacle's top.
+    """
 
     name = "line_of_sight"
     keys = ("line_of_sight",)
@@ -75,32 +78,19 @@ def _are_out_of_sight(params: Any, pose: AnyArray, a: AnyArray, b: AnyArray):
     return blocked
 
 
-class BodyParams(NamedTuple):
-    """Parameters of `is_behind_bodies`."""
-
-    x: FloatArray  # (rows,)
-    y: FloatArray  # (rows,)
-    radius_m: FloatArray  # (rows,)
-    max_radius_m: float
-    grid: Grid  # sorted
-    robots: int
-
-
 @kernel()
 def is_behind_bodies(params: Any, sender: int, receiver: int):
-    """Return True if the disc of a third robot covers a point of the line between two robot rows."""
+    """Return True if the body of a third robot covers a point of the line between two robot rows."""
     if params is None:
         return False
-    a, b = min(sender, receiver), max(sender, receiver)
-    return (
-        bodies_on_line(params.x, params.y, params.radius_m, params.max_radius_m, params.grid, params.robots, a, b) > 0
-    )
+    return bodies_on_line(params, min(sender, receiver), max(sender, receiver)) > 0
 
 
 class BodiesBlock(Stage):
-    """A link is blocked if the disc of a third robot, dead or alive, covers a point of the line between the centres.
+    """A link is blocked if the body of a third robot, dead or alive, covers a point of the line between the antennas.
 
-    For the unit disk only, as with infrared.
+    The line is in space, and the body is a cylinder whose lower side is at its robot's height. For the unit disk only,
+    as with infrared.
     """
 
     name = "bodies_block"
@@ -113,16 +103,18 @@ class BodiesBlock(Stage):
 
     def __init__(self, context: ChannelContext) -> None:
         assert context.radio.range_m is not None  # `RadioMedium` refuses a unit disk without a range
-        self._running, self._robots, self._radius_m = context.running, context.robots, context.radius_m
+        self._running, self._robots = context.running, context.robots
+        self._radius_m, self._height_m = context.radius_m, context.height_m
         arenas, rows = len(context.keys), len(context.radius_m)
         self._grid = grid_over(context.size_m, context.radio.range_m, arenas, rows, clamps=True)
         self._max_radius_m = float(context.radius_m.max())
 
     def params(self, pose: FloatArray) -> BodyParams:
-        """Return the input of the kernel for robots at `pose` (rows, 3)."""
-        x, y = np.ascontiguousarray(pose[:, 0]), np.ascontiguousarray(pose[:, 1])
+        """Return the input of the kernel for robots at `pose` (rows, 4)."""
+        x, y, z = (np.ascontiguousarray(pose[:, column]) for column in (0, 1, 3))
         sort(self._grid, pose.reshape(len(self._running), self._robots, pose.shape[1]), self._running)
-        return BodyParams(x, y, self._radius_m, self._max_radius_m, self._grid, self._robots)
+        shape = self._radius_m, self._height_m, self._max_radius_m
+        return BodyParams(x, y, z, *shape, self._grid, self._robots)
 
     def delivery(self, sender: IntArray, receiver: IntArray, pose: FloatArray) -> FloatArray:
         """Return 0 for blocked links, else 1."""

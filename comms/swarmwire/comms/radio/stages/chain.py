@@ -39,9 +39,9 @@ from swarmwire.comms.base.arrays import Table, record_type
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.context import ChannelContext
+from swarmwire.comms.radio.propagation.obstruction import BodyParams
 from swarmwire.comms.radio.stages.blocking import (
     BodiesBlock,
-    BodyParams,
     Disrupted,
     LineOfSight,
     SightParams,
@@ -150,8 +150,8 @@ def after_reception(stages: Any, pose: Any, frame: Any, link: Any):
     """Measure and delay a link that was received; in place."""
     params, dx, dy, distance_m = stages.params[0], 0.0, 0.0, 0.0
     if params.needs_distance:
-        dx, dy = to_sender_m(pose, frame.sender, frame.receiver, params.wrap_x_m, params.wrap_y_m)
-        distance_m = np.sqrt(dx * dx + dy * dy)
+        dx, dy, dz = to_sender_m(pose, frame.sender, frame.receiver, params.wrap_x_m, params.wrap_y_m)
+        distance_m = np.sqrt(dx * dx + dy * dy + dz * dz)
     delay_ns = trace_delay_ns(stages.trace_delay, frame, link.final_at_ns)
     if params.measured_range.is_used:
         link.range_m = measured_range_m(params.measured_range, distance_m, frame)

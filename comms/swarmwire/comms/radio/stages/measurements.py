@@ -21,9 +21,9 @@ wrap = njit()(wrap_angle)
 
 @kernel()
 def to_sender_m(pose: AnyArray, sender: int, receiver: int, wrap_x_m: float, wrap_y_m: float):
-    """Return the vector from receiver to sender in m, robot rows of `pose` (rows, 3); the shortest on a torus."""
+    """Return the vector from receiver to sender in m, robot rows of `pose` (rows, 4); the shortest on a torus."""
     dx, dy = pose[sender, 0] - pose[receiver, 0], pose[sender, 1] - pose[receiver, 1]
-    return dx + to_nearest(dx, wrap_x_m), dy + to_nearest(dy, wrap_y_m)
+    return dx + to_nearest(dx, wrap_x_m), dy + to_nearest(dy, wrap_y_m), pose[sender, 3] - pose[receiver, 3]
 
 
 class Measurement(Stage):
@@ -41,7 +41,7 @@ class Measurement(Stage):
 
 
 class MeasuredRange(Measurement):
-    """The distance between the centres when the packet went on air, plus a normal error; never below 0."""
+    """The distance in space between the antennas when the packet went on air, plus a normal error; never below 0."""
 
     name = "measured_range"
     keys = ("measures.range",)
@@ -64,7 +64,7 @@ def measured_range_m(params: Any, distance_m: float, frame: Any):
 class MeasuredBearing(Measurement):
     """The bearing of the sender from the receiver's body when the packet went on air, plus a normal error.
 
-    In the receiver's frame: 0 is ahead, positive to the left; wrapped to (-pi, pi].
+    In the plane, in the receiver's frame: 0 is ahead, positive to the left; wrapped to (-pi, pi].
     """
 
     name = "measured_bearing"

@@ -69,7 +69,7 @@ def decide(
         links: the table of links.
         link_used: number of links.
         neighbours: robots in range.
-        pose: poses of the robots, (rows, 3).
+        pose: poses of the robots, (rows, 4).
         keys: keys of draws, (arenas,).
         alive_in: robots that were alive in each epoch, (epochs, rows).
         first_epoch: the first epoch in `alive_in`.
@@ -144,7 +144,7 @@ class UnitDisk(RadioModel):
         self._context, self._packets, self._links = context, packets, links
         self._queues = TxQueues(context.radio, context.rows, packets)
         self._losses = LossChain.create(context)
-        self._pose = np.zeros((context.rows, 3))
+        self._pose = np.zeros((context.rows, 4))
         self._now_ns = 0
         self._waiting = 0  # packets in the queues, or more
         self._use(context)
@@ -163,7 +163,7 @@ class UnitDisk(RadioModel):
         return rows[rows["step"] == WAITING]
 
     def set_poses(self, pose: FloatArray) -> None:
-        """Use `pose` (rows, 3) for packets that go on air from now on."""
+        """Use `pose` (rows, 4) for packets that go on air from now on."""
         self._pose = pose
 
     def tune(self, at_ns: int, radio: Radio) -> None:

@@ -1,6 +1,6 @@
 """Neighbours in range: the links of a unit disk, found with the robot index.
 
-On a torus the shortest distance counts.
+Distances are in space; on a torus the shortest one counts.
 """
 
 from typing import Any, NamedTuple
@@ -30,7 +30,7 @@ def find_neighbours(
 
     Args:
         grid: a buffer, with cells of at least `range_m`.
-        pose: (rows, 3) x, y in m first.
+        pose: (rows, 4) x, y in m, heading, height in m.
         running: (arenas,).
         wrap_m: sides of a torus, where the shortest distances count, in m; 0 where arenas have walls.
         range_m: of the radio.
@@ -70,23 +70,23 @@ def _within(grid: Any, pose: AnyArray, running: Any, wrap_m: tuple[float, float]
     rows, wraps, square_m2 = arenas * robots, wrap_m[0] > 0.0, range_m * range_m
     robot_index.sort(grid, pose, running)
     # In grid order, so that the runs of robots near a robot are read sequentially.
-    order, x, y = np.empty(rows, np.uint64), np.empty(rows), np.empty(rows)
+    order, x, y, z = np.empty(rows, np.uint64), np.empty(rows), np.empty(rows), np.empty(rows)
     runs, run_count = np.empty((rows, 6, 2), np.uint64), np.zeros(rows, np.int64)
-    capacity = _near(order, x, y, runs, run_count, grid, pose, running)
+    capacity = _near(order, x, y, z, runs, run_count, grid, pose, running)
     first, other = np.zeros(rows + 1, np.int64), np.empty(capacity, np.uint64)
     count = 0
     for arena in range(arenas):
         for i in range(robots):
             row = arena * robots + i
-            x_row, y_row, self_row = pose[arena, i, 0], pose[arena, i, 1], np.uint64(row)
+            x_row, y_row, z_row, self_row = pose[arena, i, 0], pose[arena, i, 1], pose[arena, i, 3], np.uint64(row)
             for run in range(run_count[row]):
                 for k in range(runs[row, run, 0], runs[row, run, 1]):
-                    dx, dy, r = x[k] - x_row, y[k] - y_row, order[k]
+                    dx, dy, dz, r = x[k] - x_row, y[k] - y_row, z[k] - z_row, order[k]
                     if wraps:
                         dx, dy = dx + to_nearest(dx, wrap_m[0]), dy + to_nearest(dy, wrap_m[1])
                     # Branchless: write first, then advance if it counts; a third of branches would be mispredicted.
                     other[np.uint64(count)] = r
-                    count += (r != self_row) & (dx * dx + dy * dy <= square_m2)
+                    count += (r != self_row) & (dx * dx + dy * dy + dz * dz <= square_m2)
             first[row + 1] = count
     return first, other[:count].view(np.int64)
 
@@ -96,6 +96,7 @@ def _near(
     order: AnyArray,
     x: AnyArray,
     y: AnyArray,
+    z: AnyArray,
     runs: AnyArray,
     run_count: AnyArray,
     grid: Any,
@@ -108,7 +109,7 @@ def _near(
         for k in range(grid.start[arena * cells], grid.start[(arena + 1) * cells]):
             i = grid.item[k]
             row = arena * robots + i
-            order[k], x[k], y[k] = row, pose[arena, i, 0], pose[arena, i, 1]
+            order[k], x[k], y[k], z[k] = row, pose[arena, i, 0], pose[arena, i, 1], pose[arena, i, 3]
             run_count[row] = robot_index.runs_near(runs[row], grid, arena, x[k], y[k])
             for run in range(run_count[row]):
                 near += np.int64(runs[row, run, 1] - runs[row, run, 0])

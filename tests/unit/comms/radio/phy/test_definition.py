@@ -9,7 +9,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from itertools import pairwise
-from math import comb, exp, floor, hypot, inf, log10
+from math import comb, dist, exp, floor, inf, log10
 
 import numpy as np
 from hypothesis import given
@@ -19,7 +19,7 @@ from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.comms.radio.config.phy import Reception
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.packets import Fate
-from tests.support.comms.radio import TICK_NS, at, make_medium, packets, with_access
+from tests.support.comms.radio import TICK_NS, in_air, make_medium, packets, with_access
 
 US = 1000  # ns
 KEY = derive_key(1, "air")  # the arena's key in `make_medium`
@@ -46,6 +46,7 @@ class Frame:
 
 
 Packet = tuple[int, int]  # sender and sequence number
+Position = tuple[float, float, float]
 
 
 def draw(c0: int, c1: int, c2: int, name: str) -> float:
@@ -59,10 +60,10 @@ def queues(sendings: list[Sending], stations: int) -> list[deque[Sending]]:
 
 
 def run_medium(
-    radio: Radio, positions: list[tuple[float, float]], sendings: list[Sending]
+    radio: Radio, positions: list[Position], sendings: list[Sending]
 ) -> tuple[dict[Packet, int], dict[tuple[int, int, int], Fate]]:
     """Run all packets over a medium; return the times on air, and the fates by sender, sequence and receiver."""
-    pose, medium, on_air_ns, fates = at(*positions), make_medium(radio, len(positions)), {}, {}
+    pose, medium, on_air_ns, fates = in_air(*positions), make_medium(radio, len(positions)), {}, {}
     medium.step(0, pose)
     for sending in sorted(sendings):
         medium.send_at(np.array([sending.sent_ns]), packets([sending.station], size=[sending.size]))
@@ -88,12 +89,11 @@ NOISE_MW = 1.380649e-23 * 290.0 * 5e6 * 1e3
 MIN_PREAMBLE_SINR = 10.0**-0.5
 SENSITIVITY_MW = 10.0**-10.7
 TOLERANCE = 2e-3  # the model interpolates success in a table
-Position = tuple[float, float]
 
 
 def power_mw(a: Position, b: Position) -> float:
     """Return the received power: 0 dBm, less 46.6777 dB at 1 m and 30 dB per decade."""
-    return 10.0 ** (-0.1 * (46.6777 + 30.0 * log10(max(hypot(b[0] - a[0], b[1] - a[1]), 1.0))))
+    return 10.0 ** (-0.1 * (46.6777 + 30.0 * log10(max(dist(a, b), 1.0))))
 
 
 def success(sinr: float, bits: float) -> float:
@@ -172,7 +172,7 @@ def fates_at(receiver: int, frames: list[Frame], positions: list[Position]) -> d
     return fates
 
 
-POSITIONS = st.tuples(st.floats(-70.0, 70.0), st.floats(-70.0, 70.0))
+POSITIONS = st.tuples(st.floats(-70.0, 70.0), st.floats(-70.0, 70.0), st.just(0.0) | st.floats(0.0, 70.0))
 
 
 @st.composite
@@ -204,7 +204,7 @@ def test_reception_agrees_with_its_definition(scene: tuple[tuple[Position, ...],
 # Medium access: times on air of stations that sense each other.
 
 
-NEAR = [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)]
+NEAR = [(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.5, 0.5), (0.5, 0.5, 0.0)]
 CSMA = with_access("csma-802154")
 DCF = replace(with_access("dcf"), reception=Reception("threshold", preamble_sinr_db=4.0, capture_window_s=4e-6))
 

@@ -6,7 +6,7 @@ The rules are those of docs/radio.md and docs/radio.md; keyed draws come from `c
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import ceil, cos, floor, hypot, sin
+from math import ceil, cos, dist, floor, inf, sin, sqrt
 from typing import cast
 
 import numpy as np
@@ -26,6 +26,8 @@ from swarmwire.comms.robot.packets import Fate, SentPackets
 from tests.support.comms.radio import OBSTACLES, RADIOS, RATE_HZ, SIZE_M, TICK_NS, packets
 
 ARENAS, TICKS = 2, 6
+PLACED = [replace(obstacle, height_m=height_m) for obstacle, height_m in zip(OBSTACLES, (0.4, inf), strict=True)]
+Point = tuple[float, float, float]
 
 
 @dataclass
@@ -35,7 +37,7 @@ class Scene:
     radio: Radio
     robots: int  # per arena
     keys: list[int]  # (arenas,)
-    poses: FloatArray  # (ticks + 1, rows, 3)
+    poses: FloatArray  # (ticks + 1, rows, 4)
     sent: list[SentPackets]  # (ticks,)
     is_torus: bool
 
@@ -56,32 +58,33 @@ def send_offset_ns(radio: Radio, key: int, robot: int, tick: int) -> int:
     return 0 if isinstance(radio.send_offset, str) else round(radio.send_offset * 1e9)
 
 
-def is_hit(obstacle: Obstacle, ax: float, ay: float, bx: float, by: float) -> bool:
+def is_hit(obstacle: Obstacle, a: Point, b: Point) -> bool:
     """Return True if the line from a to b crosses a cylinder or a box: in its frame, clipped side by side."""
     c, s = cos(obstacle.heading_rad), sin(obstacle.heading_rad)
-    ends = [(x - obstacle.x_m, y - obstacle.y_m) for x, y in ((ax, ay), (bx, by))]
+    ends = [(x - obstacle.x_m, y - obstacle.y_m) for x, y, _ in (a, b)]
     (ax, ay), (bx, by) = ((c * x + s * y, c * y - s * x) for x, y in ends)
-    dx, dy = bx - ax, by - ay
+    dx, dy, dz, enter, leave = bx - ax, by - ay, b[2] - a[2], 0.0, 1.0
     if obstacle.shape == "cylinder":
-        share = -(ax * dx + ay * dy) / (dx * dx + dy * dy)
-        nearest = min(max(share, 0.0), 1.0)
-        return hypot(ax + nearest * dx, ay + nearest * dy) < obstacle.radius_m
-    enter, leave = 0.0, 1.0
-    for start, step, half in ((ax, dx, obstacle.size_m[0] / 2), (ay, dy, obstacle.size_m[1] / 2)):
-        low, high = sorted(((-half - start) / step, (half - start) / step))
-        enter, leave = max(enter, low), min(leave, high)
-    return enter < leave
+        middle, length2 = -(ax * dx + ay * dy) / (dx * dx + dy * dy), dx * dx + dy * dy
+        half2 = middle * middle - (ax * ax + ay * ay - obstacle.radius_m**2) / length2
+        half = sqrt(max(half2, 0.0))
+        enter, leave = (max(middle - half, 0.0), min(middle + half, 1.0)) if half2 > 0.0 else (1.0, 0.0)
+    else:
+        for start, step, half in ((ax, dx, obstacle.size_m[0] / 2), (ay, dy, obstacle.size_m[1] / 2)):
+            low, high = sorted(((-half - start) / step, (half - start) / step))
+            enter, leave = max(enter, low), min(leave, high)
+    return enter < leave and min(a[2] + enter * dz, a[2] + leave * dz) < obstacle.height_m
 
 
 def reach(scene: Scene, tick: int, sender: int, receiver: int) -> Fate:
     """Return RECEIVED for a receiver in range and in sight under the poses of a tick, else the drop reason."""
-    (ax, ay), (bx, by) = scene.poses[tick, sender, :2], scene.poses[tick, receiver, :2]
-    dx, dy = bx - ax, by - ay
+    a, b = (cast("Point", tuple(scene.poses[tick, row, [0, 1, 3]].tolist())) for row in (sender, receiver))
+    dx, dy, dz = (end - start for start, end in zip(a, b, strict=True))
     if scene.is_torus:
         dx, dy = dx - SIZE_M[0] * round(dx / SIZE_M[0]), dy - SIZE_M[1] * round(dy / SIZE_M[1])
-    if hypot(dx, dy) > cast("float", scene.radio.range_m):
+    if dist((dx, dy, dz), (0.0, 0.0, 0.0)) > cast("float", scene.radio.range_m):
         return Fate.OUT_OF_RANGE
-    if scene.radio.needs_line_of_sight and any(is_hit(obstacle, ax, ay, bx, by) for obstacle in OBSTACLES):
+    if scene.radio.needs_line_of_sight and any(is_hit(obstacle, a, b) for obstacle in PLACED):
         return Fate.BLOCKED
     return Fate.RECEIVED
 
@@ -179,6 +182,7 @@ def scenes(draw_value: st.DrawFn) -> Scene:
     radio, is_torus = draw_value(RADIOS), draw_value(st.booleans())
     robots, rng = draw_value(st.integers(2, 5)), np.random.default_rng(draw_value(st.integers(0, 2**32)))
     half, sent = np.array([*SIZE_M, 6.0]) / 2, []
+    z_m = rng.uniform(0.0, draw_value(st.sampled_from([0.0, 1.0, 5.0])), (TICKS + 1, ARENAS * robots, 1))
     for _ in range(TICKS):
         count = rng.integers(0, 4 * robots)
         sender = rng.integers(0, ARENAS * robots, count)
@@ -189,7 +193,7 @@ def scenes(draw_value: st.DrawFn) -> Scene:
         radio=replace(radio, line_of_sight=False) if is_torus else radio,
         robots=robots,
         keys=[derive_key(int(rng.integers(10**6)), arena) for arena in range(ARENAS)],
-        poses=rng.uniform(-half, half, (TICKS + 1, ARENAS * robots, 3)),
+        poses=np.concatenate([rng.uniform(-half, half, (TICKS + 1, ARENAS * robots, 3)), z_m], axis=2),
         sent=sent,
         is_torus=is_torus,
     )
@@ -197,7 +201,7 @@ def scenes(draw_value: st.DrawFn) -> Scene:
 
 def run_medium(scene: Scene) -> Outcome:
     """Return the same as `run_by_definition`, from the medium's results."""
-    obstacles = obstacle_arrays((tuple(OBSTACLES),) * ARENAS)
+    obstacles = obstacle_arrays((tuple(PLACED),) * ARENAS)
     keys = np.array(scene.keys, np.uint64)
     context = ChannelContext.open_space(scene.radio, keys, scene.robots, SIZE_M, obstacles)
     medium = RadioMedium(replace(context, is_torus=scene.is_torus), RATE_HZ)

@@ -9,14 +9,13 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, to_nearest
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
-from tests.support.comms.lines import indexed
+from tests.support.comms.lines import indexed, is_blocked_on_floor
 from tests.support.comms.radio import RATE_HZ, at, everybody, living, make_medium, packets, run, scattered
 
 MEASURES = Measures(RangeMeasure(), BearingMeasure())
@@ -202,7 +201,7 @@ def test_torus_obstacles_block_across_the_seam() -> None:
             line -= np.array(SIZE_M) * np.round(line / SIZE_M)
             nearest = min(depth(obstacle, line) for obstacle in obstacles)
             if abs(nearest) > 0.002:  # within that of a rim the points might miss it
-                assert is_blocked(index, 0, *pose[a, :2], *pose[b, :2], *SIZE_M) == (nearest < 0.0)
+                assert is_blocked_on_floor(index, 0, *pose[a, :2], *pose[b, :2], *SIZE_M) == (nearest < 0.0)
                 crosses = bool(np.any(np.abs(pose[b, :2] - pose[a, :2] - shortest[a, b]) > 1.0))
                 blocked += crosses and nearest < 0.0
     assert blocked > 100
@@ -211,7 +210,7 @@ def test_torus_obstacles_block_across_the_seam() -> None:
     clear = {
         (a, b)
         for a, b in expected_pairs(pose, 60, 5.0)
-        if a < b and not is_blocked(index, 0, *pose[a, :2], *pose[b, :2], *SIZE_M)
+        if a < b and not is_blocked_on_floor(index, 0, *pose[a, :2], *pose[b, :2], *SIZE_M)
     }
     assert pairs(*edges.T) == clear
 
