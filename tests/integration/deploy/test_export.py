@@ -20,6 +20,8 @@ from swarmwire.deploy.runs.config import Recording
 from swarmwire.metrics.pictures.drawing.film import film_of
 from swarmwire.metrics.records.run_folder.table import TableState
 from swarmwire.metrics.records.run_folder.verify import verify
+from swarmwire.world.motion.traces.reading import read_trace
+from swarmwire.world.motion.traces.trace import TracePoses
 from tests.support.deploy.runs import ROOT
 from tests.support.metrics.films import Capture, Folder, film, read, ticks_frame
 
@@ -193,6 +195,51 @@ def folders(tmp_path_factory) -> dict[str, Path]:
         overrides = [*SHORT, f'radio={{preset="{preset}",{MEASURES}}}']
         run_scenario(SCENARIO, overrides=overrides, out=made[preset], record=Recording(packets=1.0))
     return made
+
+
+MOTION_FILES = ["a.csv", "a.parquet", "a.movements", "a.tcl", "a.eel"]
+
+
+@pytest.mark.parametrize("name", MOTION_FILES)
+def test_motion_export_follows_the_robots(folders, tmp_path, name):
+    origin, folder = (47.4, 8.5, 400.0), folders["ieee802154"]
+    options = ["--origin", "47.4,8.5,400"] if name == "a.eel" else []
+    assert "(6 robots, " in export(folder, "--to", tmp_path / name, "--kind", "motion", *options)
+    trace, recorded, static = read_trace(tmp_path / name, origin=origin), RunFolder(folder), RunFolder(folder).static
+    if name in ("a.movements", "a.tcl"):  # their origin is the lower left corner
+        assert min(trace.x_m.min(), trace.y_m.min()) > 0.0
+        trace = trace.shifted(-0.5 * static.arena_size_m[0], -0.5 * static.arena_size_m[1])
+    if name in ("a.csv", "a.parquet"):
+        assert trace.names == static.robot_names
+    followed = TracePoses(trace, range(static.robots), 0.0)
+    for time_s, part in ((time_s, part) for (time_s,), part in recorded.robots().group_by("time_s")):
+        columns = ("x_m", "y_m", "heading_rad") if name in ("a.csv", "a.parquet") else ("x_m", "y_m")
+        at = followed.at(time_s)[:, [0, 1, 3]][:, : len(columns)]
+        np.testing.assert_allclose(at, part.select(columns).to_numpy(), rtol=0.0, atol=2e-6)
+
+
+def test_motion_export_can_be_of_a_part_of_the_run(folders, tmp_path):
+    export(folders["ieee802154"], "--to", tmp_path / "a.parquet", "--from", "0.1", "--until", "0.3")
+    t_s = read_trace(tmp_path / "a.parquet").t_s
+    assert (t_s.min(), t_s.max()) == (0.1, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("options", "option"),
+    [
+        (["a.tcl", "--origin", "1,2,3"], "--origin"),
+        (["a.eel", "--origin", "1,2"], "--origin"),
+        (["a.eel", "--origin", "91,2,3"], "--origin"),
+        (["a.eel", "--arena", "3"], "--arena"),
+        (["a.tcl", "--from", "9"], "--from"),
+        (["a.tcl", "--metric", "order"], "--metric"),
+    ],
+)
+def test_motion_options_that_do_not_fit_are_refused(folders, tmp_path, monkeypatch, options, option):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BadInput, match=f"^{option}: expected "):
+        export(folders["argos-rab"], "--to", *options)
+    assert not list(tmp_path.iterdir())
 
 
 def exported(folder: Path, to: Path, *options: str) -> Capture:

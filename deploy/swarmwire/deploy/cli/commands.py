@@ -46,7 +46,7 @@ COMMANDS = {
     "export": CommandEntry(
         VIEW,
         "export:export_command",
-        "Export a run as a picture, a film, a capture of its radio or a table; the suffix of the file decides.",
+        "Export a run as a picture, film, capture of its radio, table or motion trace; the suffix of the file decides.",
     ),
     "draw": CommandEntry(
         VIEW,

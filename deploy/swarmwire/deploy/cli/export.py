@@ -5,16 +5,22 @@ from typing import Annotated
 
 import typer
 
-from swarmwire.deploy.cli.exporters import DEFAULTS, EXPORTERS, ExportOptions
+from swarmwire.deploy.cli.exporters import DEFAULTS, EXPORTERS, Exporter, ExportOptions
 from swarmwire.deploy.cli.options import Overrides, Seed
 
+
+def _suffixes(exporter: Exporter, *, by_default: bool) -> str:
+    """Return the suffixes that select this exporter by default, or only together with its kind."""
+    return ", ".join(suffix for suffix in exporter.suffixes if (DEFAULTS[suffix] == exporter) == by_default)
+
+
 FILES = "; ".join(
-    f"{', '.join(exporter.suffixes)}: {exporter.help}" for exporter in EXPORTERS if exporter in DEFAULTS.values()
+    f"{suffixes}: {exporter.help}" for exporter in EXPORTERS if (suffixes := _suffixes(exporter, by_default=True))
 )
 KINDS = "; ".join(
-    f"{exporter.name} ({', '.join(exporter.suffixes)}): {exporter.help}"
+    f"{exporter.name} ({suffixes}): {exporter.help}"
     for exporter in EXPORTERS
-    if exporter not in DEFAULTS.values()
+    if (suffixes := _suffixes(exporter, by_default=False))
 )
 
 RunFolder = Annotated[Path, typer.Argument(help="A run folder; the run may be live or killed.", metavar="RUN")]
@@ -24,7 +30,7 @@ TargetFile = Annotated[
 ]
 Kind = Annotated[
     str | None,
-    typer.Option(help=f"Another content for the same suffix. {KINDS}. Default: arena."),
+    typer.Option(help=f"Another content for the same suffix. {KINDS}. Default: arena, or metrics."),
 ]
 Time = Annotated[
     float | None, typer.Option("--at", help="Time of a picture, in s. Default: the end of the run.", metavar="S")
@@ -51,6 +57,13 @@ Metric = Annotated[
 Size = Annotated[
     int | None, typer.Option(help="Longer side in pixels. Default: 1280 (pictures), 480 (GIF), 960 (MP4).")
 ]
+Origin = Annotated[
+    str | None,
+    typer.Option(
+        help="Latitude and longitude (degrees) and height (m) of the arena's centre, for EMANE. Default: 0,0,0.",
+        metavar="LAT,LON,ALT",
+    ),
+]
 
 
 def export_command(
@@ -65,16 +78,18 @@ def export_command(
     arena: Arena = None,
     metric: Metric = None,
     size: Size = None,
+    origin: Origin = None,
 ) -> None:
-    """Export a run as a picture, a film, a capture of its radio or a table; the suffix of the file decides.
+    """Export a run as a picture, film, capture of its radio, table or motion trace; the suffix of the file decides.
 
     Pictures and films need no screen. They show the arena, and metrics beside it. If the run recorded packets
     (--packets all), lines are the packets that ended in the tick, each in the colour of its fate: received, lost,
     partitioned, … Without, lines join robots that are in radio range and sight of one another. A capture needs
-    recorded packets.
+    recorded packets. A motion trace has a sample per robot and tick; a scenario can follow it.
 
       swarmwire export runs/first --to first.gif
       swarmwire export runs/first --to at-4s.png --at 4
+      swarmwire export runs/first --to motion.csv --kind motion
     """
     from swarmwire.deploy.cli.actions.export import export_run
 
@@ -87,6 +102,7 @@ def export_command(
         arena=arena,
         metrics=metric or None,
         size_px=size,
+        origin=origin,
     )
     export_run(run, to, options, kind)
 

@@ -1,4 +1,4 @@
-"""The files that `swarmwire export` can write: pictures, films, captures and tables.
+"""The files that `swarmwire export` can write: pictures, films, captures, tables and motion traces.
 
 This is the registry; `actions/export.py` writes the files.
 """
@@ -19,6 +19,7 @@ class ExportOptions:
     arena: int | None = None
     metrics: list[str] | None = None
     size_px: int | None = None  # longer side
+    origin: str | None = None  # "LATITUDE,LONGITUDE,HEIGHT" of the arena's centre
 
 
 FLAGS = {
@@ -30,6 +31,7 @@ FLAGS = {
     "arena": "--arena",
     "metrics": "--metric",
     "size_px": "--size",
+    "origin": "--origin",
 }
 
 
@@ -83,8 +85,17 @@ METRICS = Exporter(
     frozenset({"from_s", "until_s", "arena", "metrics"}),
     "export_metrics_table:write_table",
 )
+MOTION_OPTIONS = frozenset({"from_s", "until_s", "arena"})
+MOTION = Exporter(
+    "motion",
+    "the robots' motion, for BonnMotion, for ns-2 and ns-3, or as a table",
+    (".movements", ".tcl", ".parquet", ".csv"),
+    MOTION_OPTIONS,
+    "export_motion:write_motion",
+)
+EEL = Exporter("motion", "the robots' motion, for EMANE", (".eel",), MOTION_OPTIONS | {"origin"}, MOTION.function)
 
-EXPORTERS = (ARENA, DELIVERY, VIEWER, GIF, MP4, CAPTURE, METRICS)
+EXPORTERS = (ARENA, DELIVERY, VIEWER, GIF, MP4, CAPTURE, METRICS, MOTION, EEL)
 DEFAULTS: Mapping[str, Exporter] = {  # the first exporter of each suffix
     suffix: exporter for exporter in reversed(EXPORTERS) for suffix in exporter.suffixes
 }

@@ -1,0 +1,1 @@
+"""Robots that others move: the sources of their poses."""

@@ -1,0 +1,145 @@
+"""Tables of poses, `.csv` and `.parquet`: a row per sample with t_s, robot, x_m, y_m and, if present, z_m, heading_rad.
+
+The columns may be in any order, and others are ignored. Rows may be sorted by time or by robot. An empty heading is one
+that is not given.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.world.motion.traces.lines import MAX_NUMBER, refuse_empty
+from swarmwire.world.motion.traces.trace import MotionTrace
+
+NEEDED = ("t_s", "robot", "x_m", "y_m")
+OPTIONAL = ("z_m", "heading_rad")
+HEADER_LINES = 1
+
+
+def read(path: Path) -> MotionTrace:
+    """Read a table; its robots are in the order of their first rows."""
+    table = TraceTable(path)
+    names, robot = table.robots()
+    order = None if (robot[1:] >= robot[:-1]).all() else np.argsort(robot, kind="stable")
+    bounds = np.arange(len(names) + 1).astype(robot.dtype)
+    first = np.searchsorted(_in_order(robot, order), bounds).astype(np.int64)
+    t_s, x_m, y_m = (_in_order(table.numbers(column), order) for column in ("t_s", "x_m", "y_m"))
+    z_m = _in_order(table.numbers("z_m"), order) if table.has("z_m") else np.zeros(len(t_s))
+    heading = table.numbers("heading_rad", may_lack=True) if table.has("heading_rad") else np.full(len(t_s), np.nan)
+    goes_back = t_s[1:] < t_s[:-1]
+    goes_back[first[1:-1] - 1] = False  # from the last sample of a robot to the first one of the next
+    if goes_back.any():
+        sample = int(np.argmax(goes_back)) + 1
+        row = sample if order is None else int(order[sample])
+        raise table.refused(row, "t_s", f"expected rising times of each robot, got {t_s[sample]:g} s")
+    return MotionTrace(names, first, t_s, x_m, y_m, z_m, _in_order(heading, order))
+
+
+def write(path: Path, trace: MotionTrace) -> None:
+    """Write a table sorted by robot and time."""
+    import polars as pl
+
+    robot = np.repeat(np.arange(len(trace.names), dtype=np.uint32), np.diff(trace.first))
+    frame = pl.DataFrame(
+        {
+            "t_s": trace.t_s,
+            "robot": pl.Series(trace.names).gather(pl.Series(robot)),
+            "x_m": trace.x_m,
+            "y_m": trace.y_m,
+            "z_m": trace.z_m,
+            "heading_rad": pl.Series(trace.heading_rad, nan_to_null=True),
+        }
+    )
+    if path.suffix.lower() == ".parquet":
+        frame.write_parquet(path)
+    else:
+        frame.write_csv(path)
+
+
+def _in_order(values: AnyArray, order: IntArray | None) -> AnyArray:
+    return values if order is None else values[order]
+
+
+class TraceTable:
+    """The columns of a file; BadInput names its row or line, and the column."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the columns that a trace has; BadInput if one is missing, or there is no row."""
+        self._path, self._is_csv = path, path.suffix.lower() == ".csv"
+        self._frame = self._read()
+        if not len(self._frame):
+            raise refuse_empty(path)
+
+    def _read(self) -> Any:
+        import polars as pl
+
+        try:
+            with self._path.open("rb") as file:
+                if self._is_csv:
+                    frame = pl.read_csv(file, infer_schema=False).rename(str.strip)
+                    return frame.select(pl.col(self._columns(frame.columns)).str.strip_chars())
+                columns = self._columns(list(pl.read_parquet_schema(file)))
+                file.seek(0)
+                return pl.read_parquet(file, columns=columns)
+        except OSError as error:
+            raise BadInput(str(self._path), "", f"expected a readable file: {error.strerror}") from None
+        except pl.exceptions.NoDataError:
+            raise refuse_empty(self._path) from None
+        except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+            reason = str(error).partition("\n")[0]
+            raise BadInput(str(self._path), "", f"expected an intact table: {reason}") from None
+
+    def _columns(self, columns: list[str]) -> list[str]:
+        for column in NEEDED:
+            if column not in columns:
+                raise BadInput(str(self._path), column, f"is missing; the table has {', '.join(columns)}")
+        return [column for column in (*NEEDED, *OPTIONAL) if column in columns]
+
+    def has(self, column: str) -> bool:
+        """Return True if the file has a column."""
+        return column in self._frame.columns
+
+    def numbers(self, column: str, *, may_lack: bool = False) -> FloatArray:
+        """Return a column (rows,); NaN for empty cells, if these are allowed."""
+        import polars as pl
+
+        cells = self._frame[column]
+        if not (cells.dtype.is_numeric() or cells.dtype in (pl.String, pl.Null)):
+            raise BadInput(str(self._path), column, f"expected numbers, got the type {cells.dtype}")
+        numbers = cells.cast(pl.Float64, strict=False)
+        values: FloatArray = numbers.to_numpy()
+        is_valid = (values >= -MAX_NUMBER) & (values <= MAX_NUMBER)
+        if may_lack:
+            is_valid |= np.isnan(values)
+            if numbers.null_count() > cells.null_count():
+                is_valid &= (numbers.is_not_null() | cells.is_null()).to_numpy()  # else a text that is no number
+        if not is_valid.all():
+            row = int(np.argmin(is_valid))
+            raise self.refused(row, column, f"expected a number of at most {MAX_NUMBER:g}, got {cells[row]!r}")
+        return values
+
+    def robots(self) -> tuple[tuple[str, ...], AnyArray]:
+        """Return the names of the robots by first appearance, and the index of each row's robot (rows,)."""
+        import polars as pl
+
+        cells = self._frame["robot"]
+        if cells.null_count():
+            raise self.refused(int(cells.is_null().arg_max()), "robot", "expected the name of a robot")
+        if not (cells.dtype.is_integer() or cells.dtype in (pl.String, pl.Categorical, pl.Enum)):
+            raise BadInput(str(self._path), "robot", f"expected names or numbers, got the type {cells.dtype}")
+        named = cells if cells.dtype.is_integer() else cells.cast(pl.String)
+        names = named.unique(maintain_order=True)
+        kind = pl.UInt16 if len(names) < 1 << 16 else pl.UInt32  # 16 bits are sorted in a fifth of the time
+        if named.dtype == pl.String:
+            index = named.cast(pl.Enum(names)).to_physical().cast(kind)
+        else:
+            index = named.replace_strict(names, range(len(names)), return_dtype=kind)
+        return tuple(map(str, names.to_list())), index.to_numpy()
+
+    def refused(self, row: int, column: str, expected: str) -> BadInput:
+        """Return a BadInput about a row."""
+        key = f"line {row + 1 + HEADER_LINES}" if self._is_csv else f"row {row + 1}"
+        return BadInput(str(self._path), f"{key}, {column}", expected)

@@ -1,0 +1,132 @@
+"""A motion trace: the poses of robots over time, as a file has them, and the poses at a time of a run. Compiled.
+
+Between two samples a robot moves in a straight line. Two samples of the same time are a jump: from that time on, the
+later one is valid.
+"""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from swarmwire.comms.base.angles import wrap_angle
+from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.base.math.compiled import atan2
+
+_wrap_angle = njit()(wrap_angle)
+T, X, Y, HEADING = 0, 1, 2, 4  # columns of samples: time, x, y, z, heading
+
+
+@dataclass(frozen=True, eq=False)
+class MotionTrace:
+    """The samples of all robots of a file, each robot's together; arrays are (samples,) unless stated."""
+
+    names: tuple[str, ...]  # names or numbers in the file: by number, or by first appearance
+    first: IntArray  # (robots + 1,) samples of robot i are first[i]:first[i + 1], at least one
+    t_s: FloatArray  # finite, and never less than that of the robot's sample before
+    x_m: FloatArray
+    y_m: FloatArray
+    z_m: FloatArray
+    heading_rad: FloatArray  # NaN: not given in the file
+
+    def shifted(self, dx_m: float, dy_m: float) -> "MotionTrace":
+        """Return the trace with all positions moved by an offset."""
+        return replace(self, x_m=self.x_m + dx_m, y_m=self.y_m + dy_m)
+
+    def samples(self) -> Iterator[FloatArray]:
+        """Return the samples of each robot, (n, 4): time in s, x, y and z in m."""
+        for start, stop in zip(self.first[:-1], self.first[1:], strict=True):
+            part = slice(start, stop)
+            yield np.column_stack((self.t_s[part], self.x_m[part], self.y_m[part], self.z_m[part]))
+
+    def numbers(self, start: int) -> Sequence[int]:
+        """Return the names as rising numbers from at least `start`; of other names, numbers from `start` on."""
+        numbers = [int(name) for name in self.names if name.isdecimal()]
+        if len(numbers) == len(self.names) and numbers == sorted(set(numbers)) and numbers[0] >= start:
+            return numbers
+        return range(start, start + len(self.names))
+
+
+def trace_from(names: Sequence[str], samples: Sequence[Any]) -> MotionTrace:
+    """Return the trace of robots without headings; samples of each: rows of time in s, x, y and z in m."""
+    first = np.zeros(len(names) + 1, np.int64)
+    first[1:] = np.cumsum([len(rows) for rows in samples])
+    t_s, x_m, y_m, z_m = np.ascontiguousarray(np.concatenate(samples, dtype=np.float64).T)
+    return MotionTrace(tuple(names), first, t_s, x_m, y_m, z_m, np.full(len(t_s), np.nan))
+
+
+class TracePoses:
+    """Poses of robots of a trace over the time of a run.
+
+    Headings turn the short way between two samples that both have one. Elsewhere a robot heads where it moves; while it
+    stands, where it moved before; before any motion, along x. A position or heading depends on the time alone, bit for
+    bit, not on the times that were asked for before.
+    """
+
+    def __init__(self, trace: MotionTrace, order: Sequence[int], start_s: float) -> None:
+        """`order`: index in the trace of each robot of the run; the run starts at `start_s` of the file."""
+        self._start_s = start_s
+        columns = trace.t_s, trace.x_m, trace.y_m, trace.z_m, trace.heading_rad
+        robots = [slice(trace.first[robot], trace.first[robot + 1]) for robot in order]
+        # A sample's numbers are neighbours in memory: with an array of each, most accesses would miss the caches.
+        self._samples = np.concatenate([np.column_stack([column[part] for column in columns]) for part in robots])
+        self._first = np.cumsum([0, *(part.stop - part.start for part in robots)], dtype=np.int64)
+        self._cursor = self._first[:-1] - 1  # each robot's last sample up to now; at the start, before its first one
+        self._direction_rad = np.zeros(len(robots))  # of each robot's last motion up to now
+
+    def at(self, time_s: float) -> FloatArray:
+        """Return the poses (k, 4) at a time of the run: x, y, z in m, heading in rad.
+
+        Before its first sample and after its last one a robot stands there. A time before that of the last call is
+        searched for from the start of the file.
+        """
+        poses = np.empty((len(self._cursor), 4))
+        _interpolate(self._start_s + time_s, self._samples, self._first, self._cursor, self._direction_rad, poses)
+        return poses
+
+
+@njit()
+def _interpolate(time_s, samples, first, cursor, direction_rad, poses):
+    """Write the poses at a time of the file; cursors and directions move on with it."""
+    for robot in range(len(cursor)):
+        start, stop = first[robot], first[robot + 1]
+        i, motion = cursor[robot], -1  # the last segment with a motion among those that begin since the last call
+        if i >= start and time_s < samples[i, T]:  # time went back
+            i, direction_rad[robot] = start - 1, 0.0
+        while i + 1 < stop and samples[i + 1, T] <= time_s:
+            i += 1
+            if i + 1 < stop and _moves(samples, i):
+                motion = i
+        if motion >= 0:
+            dx, dy = samples[motion + 1, X] - samples[motion, X], samples[motion + 1, Y] - samples[motion, Y]
+            direction_rad[robot] = atan2(dy, dx)
+        cursor[robot] = i
+        if start <= i < stop - 1:
+            share = (time_s - samples[i, T]) / (samples[i + 1, T] - samples[i, T])
+            for axis in range(3):
+                position = samples[i, X + axis]
+                poses[robot, axis] = position + share * (samples[i + 1, X + axis] - position)
+            heading = samples[i, HEADING]
+            heading = _wrapped(heading + share * _wrapped(samples[i + 1, HEADING] - heading))
+        else:
+            i = max(i, start)
+            for axis in range(3):
+                poses[robot, axis] = samples[i, X + axis]
+            heading = _wrapped(samples[i, HEADING])
+        poses[robot, 3] = direction_rad[robot] if np.isnan(heading) else heading
+
+
+@njit()
+def _moves(samples, i):
+    """Return True if the segment from sample i on is a motion in the plane that takes time."""
+    takes_time = samples[i, T] < samples[i + 1, T]
+    return takes_time and (samples[i, X] != samples[i + 1, X] or samples[i, Y] != samples[i + 1, Y])
+
+
+@njit()
+def _wrapped(angle_rad):
+    return angle_rad if np.isnan(angle_rad) else _wrap_angle(angle_rad)
