@@ -22,7 +22,10 @@ class TrajectoryHash:
         self._pending: list[AnyArray] = []
 
     def add(self, pose: FloatArray, velocity: FloatArray, command: FloatArray, received: ReceivedPackets) -> None:
-        """Add one tick: tables are (rows, 3), a row per robot of all arenas; `received` is sorted by receiver."""
+        """Add one tick: tables are (rows, 3), a row per robot of all arenas; `received` is sorted by receiver.
+
+        Where a source moves robots, `pose` is (rows, 4), with heights.
+        """
         if not self._open:
             return
         motion = np.concatenate((pose, velocity, command), axis=1)

@@ -19,6 +19,7 @@ from swarmwire.world.placement.maps import read_layout
 from swarmwire.world.placement.occupancy import extent, heading_of, obstacle_at
 from swarmwire.world.scenario.arena import ObstacleTable
 from swarmwire.world.scenario.bodies import bodies_of
+from swarmwire.world.scenario.motion import TraceMotion
 from swarmwire.world.scenario.scenario import Scenario
 
 MAX_STEP_RADII = 0.25  # the greatest move of a robot at full speed in one physics step, in radii
@@ -37,6 +38,7 @@ def check(scenario: Scenario, where: str) -> None:
         check_radio(scenario.radio, where)
         _check_torus(scenario, scenario.radio, where)
     _check_antennas(scenario, where)
+    _check_motion(scenario, where)
     for i, event in enumerate(scenario.events):
         check_event(scenario, bodies, event, f"events.{i}", where)
 
@@ -46,7 +48,8 @@ def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> Non
         body = bodies[group]
         tick_m = body.max_linear_mps * max(1.0, noise_of(body.drive).factor) / scenario.time.rate_hz
         needed = math.ceil(tick_m / (MAX_STEP_RADII * body.radius_m) - 1e-9)
-        if engine != "kinematic" and scenario.physics.steps < needed:
+        moves = engine != "kinematic" and not scenario.robots[group].motion
+        if moves and scenario.physics.steps < needed:
             text = f"so that a robot of {group} at full speed moves at most a quarter of its radius in one step"
             raise BadInput(where, "physics.steps", f"expected at least {needed}, {text}; got {scenario.physics.steps}")
 
@@ -83,13 +86,26 @@ def _check_antennas(scenario: Scenario, where: str) -> None:
             raise BadInput(where, f"robots.{group}.radio", f"expected a radio with a PHY: {reason}")
 
 
+def _check_motion(scenario: Scenario, where: str) -> None:
+    for group, table in scenario.robots.items():
+        if table.motion is not None and scenario.arena.boundary == "torus":
+            expected = "expected walls or open as arena.boundary: a source's poses do not wrap around a torus"
+            raise BadInput(where, f"robots.{group}.motion", expected)
+        if isinstance(table.motion, TraceMotion):
+            is_geodetic = table.motion.file.endswith(".eel")
+            if is_geodetic != (table.motion.origin is not None):
+                reason = "its positions are latitudes and longitudes" if is_geodetic else "only for .eel"
+                got = "" if is_geodetic else "no "
+                raise BadInput(where, f"robots.{group}.motion.origin", f"expected {got}origin for this file: {reason}")
+
+
 def _check_impulse(scenario: Scenario, bodies: Mapping[str, Body], event: Impulse) -> None:
     """Check that the robots' engine has forces, and that the impulse moves no robot through an obstacle in one step."""
     engines = engines_of(scenario, bodies)
     for group in event.robots.groups(scenario.groups()):
-        if engines[group] == "kinematic":
-            expected = f"expected robots whose bodies have contacts: those of {group} are kinematic"
-            raise BadInput("", "robots", expected)
+        if engines[group] == "kinematic" or scenario.robots[group].motion:
+            reason = "follow a source" if scenario.robots[group].motion else "are kinematic"
+            raise BadInput("", "robots", f"expected robots whose bodies have contacts: those of {group} {reason}")
         max_mps = bodies[group].radius_m * scenario.time.rate_hz * scenario.physics.steps
         if event.speed_mps > max_mps:
             bound = (

@@ -26,6 +26,8 @@ from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.annotations import LatestValues, States
 from swarmwire.world.custom.actuators import CustomActuators
 from swarmwire.world.engines.physics import Physics, engines_of
+from swarmwire.world.motion.followed import FollowedRobots
+from swarmwire.world.motion.source import lockstep_sources
 from swarmwire.world.placement.maps import Layout, read_layout
 from swarmwire.world.placement.placement import Placement, place_arena
 from swarmwire.world.scenario.bodies import bodies_of
@@ -95,8 +97,11 @@ class World:
         groups = _groups(scenario, bodies)
         self.keys: KeyArray = np.array([derive_key("arena", seed) for seed in seeds], np.uint64)
         layout = read_layout(scenario.arena, scenario.source)
+        self._followed = _followed_robots(scenario, groups, layout.size_m)
+        starts_of = self._followed.start_poses() if self._followed else {}
         placements = [
-            place_arena(scenario, layout, groups, seed, key) for seed, key in zip(seeds, self.keys, strict=True)
+            place_arena(scenario, layout, groups, seed, key, starts_of)
+            for seed, key in zip(seeds, self.keys, strict=True)
         ]
         self.static = _static_of(scenario, groups, seeds, layout, placements)
         self.obstacles = obstacle_arrays(self.static.obstacles)
@@ -200,6 +205,8 @@ class World:
             self.actuators.leds.publish()
         if self.batteries.any:
             self.batteries.drain(self.alive, self.actuators.leds.rgb, self.actuators.target, self.actuators.motors_off)
+        if self._followed:
+            self._physics.follow(self._followed.end_states(self._physics.state, actions.poses))
         onsets = self._physics.tick(self.actuators.target)
         self._update_poses()
         return onsets
@@ -221,6 +228,11 @@ class World:
         }
 
     def _update_poses(self) -> None:
+        if self._followed:
+            index, altitude_m = self._followed.index, self._followed.altitude_m
+            self.altitude_m[:, index] = altitude_m
+            self.scene.top_m[index] += altitude_m - self.scene.bottom_m[index]
+            self.scene.bottom_m[index] = altitude_m
         self.pose, self.velocity, self.radio_pose = snapshot(self._physics.state, self.altitude_m)
         self.movable: FloatArray | None = self._physics.movable.copy() if self.static.movable else None
 
@@ -259,9 +271,19 @@ def _groups(scenario: Scenario, bodies: Mapping[str, Body]) -> tuple[Group, ...]
     groups: list[Group] = []
     start = 0
     for name, table in scenario.robots.items():
-        groups.append(Group(name, bodies[name], start, start + table.count, table.act_every_ticks))
+        followed = table.motion is not None
+        groups.append(Group(name, bodies[name], start, start + table.count, table.act_every_ticks, followed))
         start += table.count
     return tuple(groups)
+
+
+def _followed_robots(
+    scenario: Scenario, groups: tuple[Group, ...], size_m: tuple[float, float]
+) -> FollowedRobots | None:
+    """Return the robots that sources move; None if all robots move by themselves."""
+    if not any(group.followed for group in groups):
+        return None
+    return FollowedRobots(groups, lockstep_sources(scenario, size_m), scenario.time.rate_hz)
 
 
 def _static_of(

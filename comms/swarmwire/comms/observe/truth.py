@@ -34,6 +34,7 @@ class Group:
     start: int
     stop: int
     act_every_ticks: int = 1  #: the robots act when the tick modulo this is 0
+    followed: bool = False  #: True: a source moves the robots, not an engine
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +83,11 @@ class Static:
         return len(self.robot_names)
 
     @property
+    def any_followed(self) -> bool:
+        """True if a source moves any robots."""
+        return any(group.followed for group in self.groups)
+
+    @property
     def max_leds(self) -> int:
         """Largest number of LEDs of a robot."""
         return max(group.body.led_count for group in self.groups)
@@ -112,6 +118,11 @@ class EventRecord:
         """The event as a text: the action, its part if it has one, and "ended" if it ended."""
         return f"{self.do}{f' {self.part}' if self.part else ''}{' ended' if self.ended else ''}"
 
+    def changed_names(self, static: Static) -> list[list[str]]:
+        """Return the names of the robots that the event changed, a list per arena."""
+        changed = self.changed.reshape(static.arenas, static.robots)
+        return [[static.robot_names[index] for index in np.flatnonzero(mask)] for mask in changed]
+
 
 @dataclass(frozen=True, slots=True)
 class Truth:
@@ -139,5 +150,7 @@ class Truth:
     events: tuple[EventRecord, ...] = ()  #: at the tick's start, in order
     departed: TransmissionRecords | None = None  #: None without a radio, and for live observers
     movable: FloatArray | None = None  #: (arenas, movable obstacles, 3) x, y, heading; None: no movable obstacles
+    # (rows,) height in m of each robot's lower side above the floor; None: no source moves robots
+    height_m: FloatArray | None = None
     # (rows,) last noted value, NaN: none; None: no agent has noted a value yet, and for live observers
     value: FloatArray | None = None

@@ -1,8 +1,8 @@
 """The arrays that cross between world and agent backend in a tick: readings to the agents, actions to the world.
 
 `Readings` hold the robots' sensor readings. `Actions` hold their drive commands, packets, notes, LED colours, actuator
-commands, noted values and motor switches. Notes and values are for observers and do not affect the run. The last five
-are `SparseTable`s, with rows only for robots that set a number in the tick.
+commands, noted values, motor switches and poses from outside. Notes and values are for observers and do not affect the
+run. The last six are `SparseTable`s, with rows only for robots that set a number in the tick.
 """
 
 from dataclasses import field, replace
@@ -104,6 +104,7 @@ class Actions:
     actuators: SparseTable = NOTHING_SET  # slot: index among the numbers of all custom actuators of the body
     values: SparseTable = NOTHING_SET  # numbers that agents noted by `note(value=1.25)`
     motors: SparseTable = NOTHING_SET  # flying bodies: 1 on, 0 off (on the floor), until the next; only gateways
+    poses: SparseTable = NOTHING_SET  # robots that a live source moves: slots x, y, z in m, heading; only that source
 
     def for_rows(self, rows: IntArray) -> "Actions":
         """The actions of the robots with these rows, (m,)."""
@@ -138,7 +139,7 @@ class Actions:
         )
 
 
-TABLES = ("notes", "leds", "actuators", "values", "motors")  # names of the sparse tables of `Actions`
+TABLES = ("notes", "leds", "actuators", "values", "motors", "poses")  # names of the sparse tables of `Actions`
 
 
 def joined_tables(parts: list[Actions]) -> dict[str, SparseTable]:

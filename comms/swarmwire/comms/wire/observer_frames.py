@@ -5,7 +5,7 @@ and counts of an `ObservedTick`.
 """
 
 import zlib
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import MISSING, asdict, fields, is_dataclass
 from math import inf, isfinite
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, cast, get_args, get_origin, get_type_hints
@@ -126,10 +126,11 @@ def _tuple(kinds: tuple[Any, ...], items: list[object], key: str) -> tuple[Any, 
 
 def _record(kind: type[Any], value: object, key: str) -> Any:
     names = [field.name for field in fields(kind)]
-    if type(value) is not dict or cast("dict[object, object]", value).keys() != set(names):
+    needed = {field.name for field in fields(kind) if field.default is MISSING}  # older records lack newer fields
+    if type(value) is not dict or not needed <= cast("dict[str, object]", value).keys() <= set(names):
         raise BadFrame("malformed", f"{key}: expected a map of {', '.join(names)}")
     hints, values = get_type_hints(kind), cast("dict[str, object]", value)
-    return kind(**{name: _build(hints[name], values[name], f"{key}.{name}") for name in names})
+    return kind(**{name: _build(hints[name], item, f"{key}.{name}") for name, item in values.items()})
 
 
 def _body(value: object, key: str) -> Body:

@@ -34,6 +34,7 @@ from swarmwire.deploy.runs.observers import (
     TooLarge,
 )
 from swarmwire.deploy.runs.plan import Plan, make_plan
+from swarmwire.deploy.runs.pose_sources import open_sources
 from swarmwire.deploy.runs.published import ObserverEndpoint, Published
 from swarmwire.deploy.runs.real_time import raised_priority, warm_up
 from swarmwire.deploy.runs.record.folder import RunWriter
@@ -52,6 +53,7 @@ from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.backend import InterfacesBackend
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
+from swarmwire.world.motion.live import FollowingBackend, LiveSource
 from swarmwire.world.subtick import Subticks
 from swarmwire.world.world import World
 
@@ -65,6 +67,7 @@ class Run:
     observers: RunObservers
     status: Status
     served: Served | None  # robots that answer as real ones
+    pose_sources: tuple[LiveSource, ...]
     facts: RunFacts
     log: RunnerLog
 
@@ -118,10 +121,14 @@ class PreparedRun:
             served = stack.enter_context(self._serve(plan.gateways, has_interfaces=interfaces is not None))
         if served and interfaces:
             stack.enter_context(interfaces.with_gateways(served.robot_addresses()))
+        pose_sources: tuple[LiveSource, ...] = ()
+        if plan.scenario.live_motions() and not plan.config.replay:
+            poses = open_sources(plan.scenario, static, self.clock, writer.report)
+            pose_sources = stack.enter_context(poses)
         endpoint = self._observer_endpoint(stack)
         log = RunnerLog(writer.report)
         backend = stack.enter_context(open_backend(self._backend_settings(log), served))
-        loop = self._new_loop(backend, interfaces, log, stop_conditions)
+        loop = self._new_loop(backend, interfaces, pose_sources, log, stop_conditions)
         status = self._new_status(backend, loop)
         staged = self._staged_observers(loop, status, endpoint, observers)
         if served:
@@ -130,7 +137,7 @@ class PreparedRun:
             staged.append(StagedObserver(ObserverStage.PROGRAMS, InterfacesLog(interfaces, writer.report)))
         run_observers = RunObservers(staged, writer.report)
         loop.observers = run_observers.ordered
-        return Run(loop, backend, run_observers, status, served, facts, log)
+        return Run(loop, backend, run_observers, status, served, pose_sources, facts, log)
 
     def _serve(self, gateways: RunGateways, *, has_interfaces: bool) -> AbstractContextManager[Served]:
         writer, agents = self.writer, self.plan.agents
@@ -160,6 +167,7 @@ class PreparedRun:
         self,
         backend: AgentBackend,
         interfaces: OpenInterfaces | None,
+        pose_sources: Sequence[LiveSource],
         log: RunnerLog,
         stop_conditions: StopConditions | None,
     ) -> Loop:
@@ -171,6 +179,8 @@ class PreparedRun:
         if interfaces:
             subtick_ns = to_ns((plan.subtick_s or 0.0) * self.factor)
             acting = InterfacesBackend(cast("TimedBackend", acting), interfaces.ports, subtick_ns)
+        if pose_sources:
+            acting = FollowingBackend(acting, pose_sources, self.clock, self.writer.report, self.is_stopped)
         acting = self.writer.record_actions(acting, partial(self._has_external_actions, backend, log))
         return Loop(
             self.world,
@@ -196,7 +206,8 @@ class PreparedRun:
             return True
         in_real_time = self.pace is not None and (plan.runners > 0 or plan.subtick_s is not None)
         has_changed = bool(log.losses) or any(event.tick >= 0 for event in log.events)
-        return in_real_time or has_changed or plan.gateways is not None
+        has_poses = bool(plan.scenario.live_motions())
+        return in_real_time or has_changed or has_poses or plan.gateways is not None
 
     def _new_status(self, backend: AgentBackend, loop: Loop) -> Status:
         return Status(

@@ -20,6 +20,7 @@ from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.backends.runner_reports import RunnerEvent
 from swarmwire.world.interfaces.backend import InterfacesReport
 from swarmwire.world.loop import Loop
+from swarmwire.world.motion.live import PosesReport
 from swarmwire.world.world import World
 
 NO_STOP = {"stop_time_s": None, "stopped_by": None}
@@ -116,6 +117,7 @@ class Result:
     runner_events: tuple[RunnerEvent, ...]  #: runners that joined, left, were lost and returned, in order
     realtime: RealTimeReport | None
     interfaces: InterfacesReport | None  #: report on the robots' network interfaces
+    poses: tuple[PosesReport, ...]  #: reports on the live sources of poses
     facts: RunFacts
     inputs: InputsRecord | None  #: recorded external actions
     live_events: LiveEventsRecord | None  #: recorded live events
@@ -176,6 +178,7 @@ class Result:
             "runner_events": [asdict(change) for change in self.runner_events],
             "realtime": asdict(self.realtime) if self.realtime else None,
             "interfaces": asdict(self.interfaces) if self.interfaces else None,
+            "poses": [asdict(report) for report in self.poses],
             "gateways": dict(self.facts.gateways),
             "record": self.record,
             "cpu": self.facts.cpu,
@@ -226,6 +229,7 @@ def result_of(
         runner_events=tuple(run.log.events),
         realtime=realtime,
         interfaces=entries.get("interfaces"),
+        poses=tuple(source.report() for source in run.pose_sources),
         facts=facts,
         inputs=writer.inputs(),
         live_events=writer.live_events(),

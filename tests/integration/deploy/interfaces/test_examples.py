@@ -4,8 +4,10 @@ import json
 import re
 import sys
 
+import numpy as np
 import pytest
 from scipy import stats
+from scipy.sparse.csgraph import connected_components
 
 from tests.support.clocks import until
 from tests.support.deploy.interfaces import (
@@ -17,7 +19,7 @@ from tests.support.deploy.interfaces import (
     running,
     with_program,
 )
-from tests.support.deploy.runs import swarmwire
+from tests.support.deploy.runs import ROOT, swarmwire
 
 pytestmark = needs_interfaces
 LOSS = 0.2
@@ -175,4 +177,26 @@ def test_babeld_routes_over_many_hops_and_around_a_dead_robot(tmp_path):
         assert swarmwire("ctl", "--run", world.folder, "kill", on_way).returncode == 0
         until(lambda: other in hops(world, "line-8"))
         until(lambda: world.on("line-0", "ping", "-c", "1", "-W", "1", far).returncode == 0)
+        world.end()
+
+
+@needs_program("babeld", "ping", "ip")
+def test_babeld_routes_between_walkers_of_a_trace_over_several_hops(tmp_path):
+    """The trace says who is near whom at the start; the two farthest walkers that are connected need other ones."""
+    scenario = (ROOT / "examples" / "motion" / "mesh.toml").read_text()
+    scenario = scenario.replace("../../scenarios", f"{ROOT}/scenarios").replace(
+        "../interfaces", f"{ROOT}/examples/interfaces"
+    )
+    with running(tmp_path, scenario) as world:
+        start_m = np.array([line.split()[1:3] for line in (ROOT / "scenarios" / "walk.movements").open()], float)
+        away_m = np.hypot(*(start_m[:, None] - start_m).transpose(2, 0, 1))
+        _, member = connected_components(away_m < 140.0)
+        one = int(np.argmax(np.bincount(member)[member]))
+        same = np.flatnonzero(member == member[one])
+        other = int(same[np.argmax(away_m[one, same])])
+        assert away_m[one, other] > 150.0
+        address = world.address(f"walkers-{other}")
+        until(lambda: world.on(f"walkers-{one}", "ping", "-c", "1", "-W", "1", address).returncode == 0)
+        route = world.on(f"walkers-{one}", "ip", "route", "get", address).stdout
+        assert "via" in route
         world.end()

@@ -34,6 +34,7 @@ def build_engine(
     max_force_n: Any = 15.0,
     max_torque_nm: Any = 150.0,
     wheel_base_m: Any = 0.14,
+    followed: Any = False,
 ) -> Engine:
     """An engine of foot-bots, but for the arguments, at pose (n, 3) or (arenas, n, 3)."""
     at = np.array(pose, np.float64)
@@ -47,7 +48,7 @@ def build_engine(
     standing = (tuple(obstacles),) * arenas
     low = np.zeros(n)
     shapes = size_m, boundary, standing, obstacle_arrays(standing), radius, low, low + 0.1, motors
-    return make(EngineConfig(*shapes, TICK_S, steps), at)
+    return make(EngineConfig(*shapes, TICK_S, steps, np.broadcast_to(followed, n).copy()), at)
 
 
 def targets(engine: Engine, forward_mps: Any = 0.0, turn_radps: Any = 0.0, left_mps: Any = 0.0) -> FloatArray:

@@ -40,7 +40,9 @@ def engine(
     bottom = np.broadcast_to(np.asarray(bottom_m, np.float64), n).copy()
     motors = EngineMotors(*(np.full(n, value) for value in (0.06, 1.0, 1.0, 1.0, 1.0)))
     shapes = np.full(n, RADIUS_M), bottom, bottom + 0.1, motors
-    config = EngineConfig((4.0, 4.0), boundary, standing, obstacle_arrays(standing), *shapes, TICK_S, 5)
+    config = EngineConfig(
+        (4.0, 4.0), boundary, standing, obstacle_arrays(standing), *shapes, TICK_S, 5, np.zeros(len(at[0]), np.bool_)
+    )
     return KinematicEngine(config, at)
 
 
@@ -252,7 +254,9 @@ def engine_with(
     radius_m, bottom_m = np.resize([0.02, 0.1, 0.05, 0.04], n), np.resize([0.0, 0.0, 0.2], n)
     motors = EngineMotors(*(np.full(n, value) for value in (0.06, 1.0, 1.0, 1.0, 1.0)))
     shapes = radius_m, bottom_m, bottom_m + 0.1, motors
-    return KinematicEngine(EngineConfig(SIZE_M, boundary, standing, arrays, *shapes, STEP_S, 5), pose)
+    return KinematicEngine(
+        EngineConfig(SIZE_M, boundary, standing, arrays, *shapes, STEP_S, 5, np.zeros(n, np.bool_)), pose
+    )
 
 
 def crowded(rng: np.random.Generator, count: int) -> tuple[Obstacle, ...]:

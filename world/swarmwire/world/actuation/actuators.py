@@ -272,14 +272,21 @@ class Actuators:
         self.set_failed({})
         self._ticks = 0
         self._clipped, self._not_finite = np.zeros(arenas, np.int64), np.zeros(arenas, np.int64)
+        followed = np.repeat([group.followed for group in groups], [group.stop - group.start for group in groups])
+        self._followed: BoolArray = np.tile(followed, arenas)  # (rows,) robots that do not drive
+        self._any_followed, self._ignored = bool(followed.any()), np.zeros(arenas, np.int64)
 
     def apply(self, actions: Actions, alive: BoolArray) -> None:
         """Apply the actions of a tick. Robots without a new command keep the last one.
 
-        Robots that are not `alive` (rows,) ignore commands.
+        Robots that are not `alive` (rows,), or that a source moves, ignore commands.
         """
-        self.command = self.command.copy()
-        new = NewCommands(actions.rows, actions.drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)
+        self.command, drive = self.command.copy(), actions.drive
+        if self._any_followed:
+            ignored = drive & self._followed[actions.rows]
+            np.add.at(self._ignored, actions.rows[ignored] // self.target.shape[1], 1)
+            drive = drive & ~ignored
+        new = NewCommands(actions.rows, drive, actions.linear_mps, actions.angular_radps, actions.lateral_mps)
         clipped, not_finite = limit_commands(self._limits, alive, new, self.command)
         self._clipped, self._not_finite = self._clipped + clipped, self._not_finite + not_finite
         if self._exact:
@@ -306,9 +313,10 @@ class Actuators:
         self.motors_off.ravel()[dead] = False
 
     def counts(self) -> dict[str, IntArray]:
-        """Return the number of clipped commands, commands that were not finite, and changes of missing LEDs, by name.
+        """Return the number of clipped, not finite and ignored commands, and of changes of missing LEDs, by name.
 
-        Each is (arenas,).
+        Each is (arenas,). Robots that a source moves ignore commands.
         """
         commands = {"clipped_commands": self._clipped, "nan_commands": self._not_finite}
+        commands["commands_to_followed"] = self._ignored
         return {**commands, "leds_not_there": self.leds.missing}

@@ -47,6 +47,7 @@ class EngineConfig:
     motors: EngineMotors  # (n,) each
     tick_s: float
     steps: int  # physics steps in a tick
+    followed: BoolArray  # (n,) True: a source moves the robot, see `Engine.follow`
 
 
 def engine_config_of(static: Static, obstacles: Obstacles, groups: Sequence[Group], steps: int) -> EngineConfig:
@@ -67,6 +68,7 @@ def engine_config_of(static: Static, obstacles: Obstacles, groups: Sequence[Grou
         motors=motors_of(groups),
         tick_s=1.0 / static.rate_hz,
         steps=steps,
+        followed=np.repeat([group.followed for group in groups], count),
     )
 
 
@@ -89,6 +91,14 @@ class Engine(Protocol):
         Returns:
             (arenas, 2) contacts that began: robot with robot, robot with wall or obstacle. A contact begins if a pair
             touches in this tick and did not in the last; all walls and obstacles count as one body.
+        """
+        ...
+
+    def follow(self, end: FloatArray) -> None:
+        """Set the states of the k followed robots at the end of the next tick, (arenas, k, 6).
+
+        Within the tick they move by the velocities in it, and nothing pushes them away. Contacts of followed robots
+        with one another, with walls and with obstacles do not count.
         """
         ...
 

@@ -70,6 +70,9 @@ class KinematicEngine:
             np.zeros((arenas, n), np.bool_),
         )
         self._touching = np.empty(0, np.int64)
+        self._followed: IntArray = np.flatnonzero(config.followed)
+        self._fixed: BoolArray = np.append(config.followed, True)  # bodies by number in `overlaps`
+        self._end: FloatArray | None = None  # states of the followed robots at the end of the tick
 
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick at targets (arenas, n, 3), and count the contacts that began, (arenas, 2)."""
@@ -77,12 +80,32 @@ class KinematicEngine:
         path_m = self._tick_s * float(portable.hypot(target[:, :, 0], target[:, :, 2]).max())
         correction = self._corrections.within(float(bodies.discs.radius_m.max()) + path_m)
         _move(correction, bodies, target, self._tick_s)
+        if self._end is not None:
+            self._set_followed(self._end)
         overlapping = overlaps(bodies.state, bodies.discs, bodies.pushed, bodies.running, correction, self._cells)
+        if len(self._followed):
+            first, second = overlapping // len(self._fixed) % len(self._fixed), overlapping % len(self._fixed)
+            overlapping = overlapping[~(self._fixed[first] & self._fixed[second])]
         overlapping_before, self._touching = self._touching, overlapping
         onsets = np.zeros((len(target), 2), np.int64)
         count_began(self._touching, overlapping_before, target.shape[1] + 1, onsets)
         mark(self._touching, self.touched)
         return onsets
+
+    def follow(self, end: FloatArray) -> None:
+        """Set the states of the followed robots at the end of the next tick, (arenas, k, 6)."""
+        self._end = end
+
+    def _set_followed(self, end: FloatArray) -> None:
+        """Set the followed robots of running arenas to their states, and add the way to the travel of their wheels."""
+        bodies = self._bodies
+        selected = np.ix_(np.flatnonzero(bodies.running), self._followed)
+        end = end[bodies.running]
+        middle = end[:, :, 2] - 0.5 * self._tick_s * end[:, :, 5]
+        rolled = self._tick_s * (end[:, :, 3] * portable.cos(middle) + end[:, :, 4] * portable.sin(middle))
+        turned = 0.5 * self._tick_s * end[:, :, 5] * bodies.wheel_base_m[self._followed]
+        bodies.travel_m[selected] += np.stack((rolled - turned, rolled + turned), axis=2)
+        bodies.state[selected], bodies.pushed[selected] = end, False
 
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Raise TypeError: this engine has no forces. Validation refuses scenarios with impulses for it."""

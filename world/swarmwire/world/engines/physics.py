@@ -1,6 +1,7 @@
 """All bodies of all arenas, and the choice of an engine for each group.
 
-One engine moves each group; a world may have several engines. Robots of different engines do not touch one another:
+One engine moves each group; a world may have several engines. Robots that a source moves (`world.motion`) are in an
+engine too, which moves them as the source says. Robots of different engines do not touch one another:
 robots on the floor and flying robots pass. The engine of the floor moves bodies with contacts; the kinematic engine
 moves bodies without contacts and flying bodies.
 """
@@ -49,6 +50,10 @@ class Physics:
         steps: int,
     ) -> None:
         """Make bodies at rest at `pose` (arenas, robots, 3), moved by the engine of their group in `engines`."""
+        self._followed: list[IntArray] = []  # of each engine, its rows among all followed robots
+        number = (
+            np.cumsum(np.repeat([g.followed for g in static.groups], [g.stop - g.start for g in static.groups])) - 1
+        )
         self.names: tuple[EngineName, ...] = tuple(name for name in ENGINES if name in engines.values())
         self._engines: list[Engine] = []
         self._robots: list[IntArray] = []  # the robot index of each row of each engine
@@ -58,6 +63,7 @@ class Physics:
             config = engine_config_of(static, obstacles, engine_groups, steps)
             self._engines.append(ENGINES[name](config, np.ascontiguousarray(pose[:, index])))
             self._robots.append(index)
+            self._followed.append(number[index[config.followed]])
         pymunk_engines = [engine for engine in self._engines if isinstance(engine, PymunkEngine)]
         self.movable = pymunk_engines[0].movable if pymunk_engines else np.zeros((len(pose), 0, 3))
         if len(self._engines) == 1:
@@ -86,6 +92,12 @@ class Physics:
         self._gather()
         return onsets
 
+    def follow(self, end: FloatArray) -> None:
+        """Set the states of all followed robots at the end of the next tick, (arenas, k, 6); see `Engine.follow`."""
+        for engine, rows in zip(self._engines, self._followed, strict=True):
+            if len(rows):
+                engine.follow(np.ascontiguousarray(end[:, rows]))
+
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, robots, 2) in m/s; TypeError for the kinematic engine."""
         for engine, index in zip(self._engines, self._robots, strict=True):
@@ -110,7 +122,11 @@ def engines_of(scenario: Scenario, bodies: Mapping[str, Body]) -> dict[str, Engi
     """Return the engine of each group, by the group's name."""
     requested = scenario.physics.engine
     floor: EngineName = requested if requested != "auto" else "pymunk" if movable_in(scenario) else "discs"
-    return {name: floor if body.contacts and body.altitude_m == 0.0 else "kinematic" for name, body in bodies.items()}
+    on_floor = [name for name, body in bodies.items() if body.contacts and body.altitude_m == 0.0]
+    # Followed robots need an engine with contacts only where others may run into them.
+    if all(scenario.robots[name].motion for name in on_floor):
+        on_floor = []
+    return {name: floor if name in on_floor else "kinematic" for name in bodies}
 
 
 def movable_in(scenario: Scenario) -> list[int]:
@@ -130,7 +146,7 @@ def check_engines(scenario: Scenario, bodies: Mapping[str, Body], where: str) ->
         raise BadInput(where, f"arena.obstacles.{movable[0]}.movable", expected)
     requested = scenario.physics.engine
     if requested != "auto" and requested not in engines.values():
-        reasons = ", ".join(f"{name} {_kinematic_reason(bodies[name])}" for name in engines)
+        reasons = ", ".join(f"{name} {_kinematic_reason(scenario, name, bodies[name])}" for name in engines)
         raise BadInput(
             where, "physics.engine", f"expected auto or kinematic: no robot could be moved by {requested}: {reasons}"
         )
@@ -143,6 +159,8 @@ def check_engines(scenario: Scenario, bodies: Mapping[str, Body], where: str) ->
         )
 
 
-def _kinematic_reason(body: Body) -> str:
-    """Return the reason why only the kinematic engine can move a body."""
+def _kinematic_reason(scenario: Scenario, name: str, body: Body) -> str:
+    """Return the reason why only the kinematic engine can move the robots of a group."""
+    if scenario.robots[name].motion:
+        return "follows a source"
     return "flies" if body.altitude_m > 0.0 else "has no contacts"

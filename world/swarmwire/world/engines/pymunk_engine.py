@@ -136,12 +136,13 @@ class ArenaSpace:
     ) -> None:
         self._space = pymunk.Space()
         self._space.collision_slop = SLOP_M
-        masses_kg = [*config.motors.mass_kg.tolist(), *(load.mass_kg for load in loads)]
+        masses_kg = [*config.motors.mass_kg[~config.followed].tolist(), *(load.mass_kg for load in loads)] or [1.0]
         self._space.iterations = min(max(ITERATIONS, round(max(masses_kg) / min(masses_kg))), MAX_ITERATIONS)
         self._space.collision_persistence = config.steps  # pymunk lists a pair for that many steps: a tick
         widest_m = float(config.radius_m.max())
         self._space.use_spatial_hash(2.0 * widest_m, 2 * len(pose))
-        robots = [self._add_robot(*robot) for robot in zip(config.motors.mass_kg, config.radius_m, pose, strict=True)]
+        columns = config.motors.mass_kg, config.radius_m, pose, config.followed
+        robots = [self._add_robot(*robot) for robot in zip(*columns, strict=True)]
         walls = _walls(config.size_m, widest_m) if config.boundary == "walls" else ()
         for obstacle in (*walls, *obstacles):
             if not obstacle.movable:
@@ -155,11 +156,13 @@ class ArenaSpace:
         order = np.argsort(np.array(ids, np.uintp))
         self._ids = np.array(ids, np.uintp)[order]
         self._index = np.minimum(order, self._robots)  # all obstacles and walls count as one body
+        self._moves = np.concatenate((~config.followed, np.ones(len(loads), np.bool_), [False]))[order]
         self._touching = np.empty(0, np.int64)
 
-    def _add_robot(self, mass_kg: float, radius_m: float, pose: FloatArray) -> pymunk.Body:
+    def _add_robot(self, mass_kg: float, radius_m: float, pose: FloatArray, followed: bool) -> pymunk.Body:
         mass, radius = float(mass_kg), float(radius_m)
-        body = pymunk.Body(mass, 0.5 * mass * radius**2)
+        kind = pymunk.Body.KINEMATIC if followed else pymunk.Body.DYNAMIC  # nothing pushes a kinematic body
+        body = pymunk.Body(mass, 0.5 * mass * radius**2, kind)
         body.position, body.angle = (float(pose[0]), float(pose[1])), float(pose[2])
         disc = pymunk.Circle(body, radius)
         disc.friction = FRICTION
@@ -220,6 +223,19 @@ class ArenaSpace:
             body, (x_mps, y_mps) = self._robot_bodies[row], by_mps[row].tolist()
             body.velocity = body.velocity.x + x_mps, body.velocity.y + y_mps
 
+    def set_velocities(self, robots: IntArray, velocities: FloatArray) -> None:
+        """Set the velocities of followed robots by index, (k, 3) in m/s, m/s, rad/s."""
+        for robot, (x_mps, y_mps, turn_radps) in zip(robots.tolist(), velocities.tolist(), strict=True):
+            body = self._robot_bodies[robot]
+            body.velocity, body.angular_velocity = (x_mps, y_mps), turn_radps
+
+    def set_poses(self, robots: IntArray, poses: FloatArray) -> None:
+        """Set the poses of followed robots by index, (k, 3)."""
+        for robot, (x_m, y_m, heading_rad) in zip(robots.tolist(), poses.tolist(), strict=True):
+            body = self._robot_bodies[robot]
+            body.position, body.angle = (x_m, y_m), heading_rad
+            self._space.reindex_shapes_for_body(body)
+
     def step(self, step_s: float) -> None:
         """Write the forces and move by one physics step."""
         set_space_bodies(self._space, WRITE, self._forces)
@@ -233,6 +249,7 @@ class ArenaSpace:
         self._contacts.clear()
         get_space_arbiters(self._space, CONTACT, self._contacts)
         contacts = _ids_in(self._contacts).reshape(-1, 2)
+        contacts = contacts[self._moves[np.searchsorted(self._ids, contacts)].any(axis=1)]
         before, self._touching = self._touching, pairs_of(contacts, self._ids, self._index)
         count_began(self._touching, before, self._robots + 1, onsets)
         mark(self._touching, touched)
@@ -275,10 +292,16 @@ class PymunkEngine:
         ]
         self._running: BoolArray = np.ones(arenas, np.bool_)
         self._moving = list(range(arenas))  # indices of the running arenas
+        self._followed: IntArray = np.flatnonzero(config.followed)
+        self._end: FloatArray | None = None  # states of the followed robots at the end of the tick
         self._read()
 
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick towards targets (arenas, n, 3), and count the contacts that began, (arenas, 2)."""
+        if self._end is not None:
+            for arena in self._moving:
+                self.state[arena, self._followed, 3:] = self._end[arena, :, 3:]
+                self._spaces[arena].set_velocities(self._followed, self._end[arena, :, 3:])
         for _ in range(self._steps):
             # A turn of a braked robot by contacts is slowed down, but not compensated.
             np.copyto(self._unhindered, self.state[:, :, 5], where=self.braked)
@@ -287,12 +310,20 @@ class PymunkEngine:
             for arena in self._moving:
                 self._spaces[arena].step(self._step_s)
             self._read()
+        if self._end is not None:
+            for arena in self._moving:
+                self._spaces[arena].set_poses(self._followed, self._end[arena, :, :3])
+            self._read()
         if self.movable.size:
             self._movables.move(self._load_state)
         onsets = np.zeros((len(self._spaces), 2), np.int64)
         for arena in self._moving:
             self._spaces[arena].count_onsets(onsets[arena : arena + 1], self.touched[arena : arena + 1])
         return onsets
+
+    def follow(self, end: FloatArray) -> None:
+        """Set the states of the followed robots at the end of the next tick, (arenas, k, 6)."""
+        self._end = end
 
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, robots, 2) in m/s."""

@@ -6,7 +6,7 @@ arena's seed and on earlier entities, never on later ones. Lights have no body: 
 lights with a gap keep clear of lights. Robots keep clear of bodies that they could touch at their height.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -37,6 +37,7 @@ from swarmwire.world.scenario.scenario import RobotsTable, Scenario
 from swarmwire.world.scenario.tables import AtPoses, OnGrid, PlacementTable, RegionTable
 
 ROBOT, HEADING = purpose("place of a robot"), purpose("heading of a robot")
+NO_STARTS: Mapping[str, FloatArray] = {}
 NOTHING_FREE = f"none of {MAX_CANDIDATES} places tried is free"
 
 
@@ -49,8 +50,18 @@ class Placement:
     pose: FloatArray  # (robots, 3) x, y in m, heading in rad, in (-pi, pi]
 
 
-def place_arena(scenario: Scenario, layout: Layout, groups: Sequence[Group], seed: int, key: np.uint64) -> Placement:
-    """Place obstacles, lights and robots of the arena with this seed and key; BadInput names an entity without room."""
+def place_arena(
+    scenario: Scenario,
+    layout: Layout,
+    groups: Sequence[Group],
+    seed: int,
+    key: np.uint64,
+    starts: Mapping[str, FloatArray] = NO_STARTS,
+) -> Placement:
+    """Place obstacles, lights and robots of the arena with this seed and key; BadInput names an entity without room.
+
+    `starts` has the poses (count, 3) of groups that a source moves, which stand there in any case.
+    """
     store = PlacedObstacles(scenario.arena, layout)
     obstacles = (*layout.boxes, *_place_obstacles(scenario, store, seed, key))
     lights = _place_lights(scenario, store, seed, key)
@@ -59,16 +70,18 @@ def place_arena(scenario: Scenario, layout: Layout, groups: Sequence[Group], see
     pose = np.empty((groups[-1].stop, 3))
     for group in groups:
         table, body = scenario.robots[group.name], group.body
-        bottom_m, fixed = body.altitude_m, _fixed(table)
+        start, bottom_m = starts.get(group.name), body.altitude_m
+        fixed = _fixed(table) if start is None else np.ascontiguousarray(start[:, :2])
         disc = Disc(body.radius_m, gaps_m[group.name], bottom_m, bottom_m + body.height_m)
         region = _region(table.place, occupancy)
-        unplaced = place_robots(occupancy, region, fixed, key, ROBOT, group.start, group.stop, disc)
+        robots = group.start, group.stop
+        unplaced = place_robots(occupancy, region, fixed, key, ROBOT, *robots, disc, start is None)
         if unplaced != NO_ROBOT:
             i, reason = unplaced - group.start, NOTHING_FREE
             if len(fixed):
                 reason = f"at ({fixed[i, 0]:g}, {fixed[i, 1]:g}) it would stand outside or touch something"
             raise _no_room(scenario, f"robots.{group.name}.place", f"{group.name}-{i}", reason, seed)
-        pose[group.start : group.stop, 2] = _headings(table.place, group, key)
+        pose[group.start : group.stop, 2] = _headings(table.place, group, key) if start is None else start[:, 2]
     pose[:, :2] = occupancy.robot[:, :2]
     return Placement(obstacles, lights, pose)
 

@@ -15,6 +15,7 @@ from swarmwire.world.events import ACTIONS
 from swarmwire.world.events.event import Event
 from swarmwire.world.events.selection import Groups
 from swarmwire.world.scenario.arena import ArenaTable
+from swarmwire.world.scenario.motion import LiveMotion, MotionTable
 from swarmwire.world.scenario.schema import AsTable, OneOf
 from swarmwire.world.scenario.tables import (
     AtPoses,
@@ -72,6 +73,8 @@ class RobotsTable(ScenarioTable):
     """Power and gain of the group's radios; only for a radio with a PHY."""
     place: PlacementTable = InArena(how="arena")
     """Poses of the robots at the start."""
+    motion: MotionTable | None = None
+    """Source of the robots' poses, if others move them; default: the robots move by their own drives."""
 
     @model_validator(mode="after")
     def _check_poses(self) -> "RobotsTable":
@@ -154,6 +157,11 @@ class Scenario(ScenarioTable):
         if isinstance(self.stop, StopTable):
             return {"stop": self.stop}
         return {f"stop.{index}": table for index, table in enumerate(self.stop)}
+
+    def live_motions(self) -> dict[str, LiveMotion]:
+        """Return the live source of poses of each group that has one, by the group's name."""
+        motions = {name: table.motion for name, table in self.robots.items()}
+        return {name: motion for name, motion in motions.items() if isinstance(motion, LiveMotion)}
 
     def groups(self) -> Groups:
         """Return the indices within an arena of each group's robots."""

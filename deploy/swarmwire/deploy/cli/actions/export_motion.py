@@ -9,7 +9,7 @@ from swarmwire.comms.base.atomic import check_output_path, output_file
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.cli.actions.export_metrics_table import chosen_ticks
 from swarmwire.deploy.cli.exporters import EEL, MOTION, ExportOptions
-from swarmwire.metrics.records.run_folder.layout import MOVABLE, POSE, VALUE
+from swarmwire.metrics.records.run_folder.layout import HEIGHT, MOVABLE, POSE, VALUE
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.run_folder.ticks import robot_columns
 from swarmwire.world.motion.traces.reading import write_trace
@@ -37,7 +37,7 @@ def _recorded_motion(folder: RunFolder, options: ExportOptions) -> tuple[MotionT
     static, arena = folder.static, options.arena or 0
     if not 0 <= arena < static.arenas:
         raise BadInput("--arena", "", f"expected 0 to {static.arenas - 1}, got {arena}")
-    unused = [name for name in (*robot_columns(static), VALUE, *MOVABLE) if name not in POSE]
+    unused = [name for name in (*robot_columns(static), VALUE, *MOVABLE) if name not in (*POSE, HEIGHT)]
     ticks = folder.table("ticks", arena, unused).sort("tick")
     if ticks.is_empty():
         raise BadInput(str(folder.path), "", "holds no tick yet")
@@ -49,10 +49,13 @@ def _recorded_motion(folder: RunFolder, options: ExportOptions) -> tuple[MotionT
         return np.round(values, DECIMALS).T.reshape(-1)
 
     x_m, y_m, heading_rad = map(by_robot, POSE)
+    if HEIGHT in ticks.columns:
+        z_m = by_robot(HEIGHT)
+    else:
+        altitudes_m = [group.body.altitude_m for group in static.groups for _ in range(group.start, group.stop)]
+        z_m = np.repeat(altitudes_m, len(t_s))
     first = len(t_s) * np.arange(static.robots + 1)
-    trace = MotionTrace(
-        static.robot_names, first, np.tile(t_s, static.robots), x_m, y_m, np.zeros(len(x_m)), heading_rad
-    )
+    trace = MotionTrace(static.robot_names, first, np.tile(t_s, static.robots), x_m, y_m, z_m, heading_rad)
     return trace, static.arena_size_m
 
 

@@ -11,7 +11,6 @@ from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.observe.truth import EventRecord, Static, Truth
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.records.run_folder.events import changed_names
 from swarmwire.metrics.text import abbreviate
 
 SHOWN = ("order", "largest_component", "components")  # names of metrics
@@ -134,7 +133,7 @@ class Figures:
 
 
 def _words(event: EventRecord, time_ns: int, static: Static) -> str:
-    robots = [name for arena_names in changed_names(event, static) for name in arena_names]
+    robots = [name for arena_names in event.changed_names(static) for name in arena_names]
     subject = f"{len(robots)} robots" if static.arenas > 1 else abbreviate(robots, MAX_NAMED) or "no robot"
     return f"{to_s(time_ns):.1f} s  {event.words}: {subject}"
 

@@ -15,7 +15,6 @@ from swarmwire.comms.observe.run_views import ObservedRun, ObservedTick
 from swarmwire.comms.observe.truth import EventRecord, Static
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.live.remote_control import RemoteControl
-from swarmwire.metrics.records.run_folder.events import changed_names
 from swarmwire.metrics.text import abbreviate
 
 POLL_S = 0.2
@@ -205,7 +204,7 @@ class TickNumbers:
 
 def changed_robots(event: EventRecord, static: Static) -> str:
     """Return a text on the robots that an event changed."""
-    changed = changed_names(event, static)[0]
+    changed = event.changed_names(static)[0]
     if not changed:
         return "none"
     if len(changed) == static.robots:

@@ -32,6 +32,7 @@ from swarmwire.comms.base.plugins import ONNX, file_of, resolve, with_file
 from swarmwire.deploy.runs.scenario_parts import trace_path
 from swarmwire.metrics.measures.metric import MetricInfo
 from swarmwire.metrics.records.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, CopiedFile
+from swarmwire.world.motion.source import motion_files
 from swarmwire.world.placement.maps import path_near_scenario
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
@@ -185,6 +186,11 @@ def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
     trace = trace_path(scenario)
     if trace is not None:
         mapping["radio"]["trace"]["file"] = copies.add(trace, "trace")
+    for group, path in motion_files(scenario).items():
+        mapping["robots"][group]["motion"]["file"] = copies.add(path, "motion")
+    for group in mapping["robots"].values():
+        if "kind" in group.get("motion", {}):
+            group["motion"]["kind"] = copies.class_of(group["motion"]["kind"], folder, "motion")
     for role in ("map", "ground"):
         table = mapping["arena"].get(role, {})
         if "image" in table:

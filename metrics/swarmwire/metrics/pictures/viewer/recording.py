@@ -13,7 +13,6 @@ from swarmwire.metrics.measures.measure import MetricValues
 from swarmwire.metrics.pictures.viewer.program import Target
 from swarmwire.metrics.pictures.viewer.rows import RerunRows
 from swarmwire.metrics.pictures.viewer.selection import ARENA, selected_robot
-from swarmwire.metrics.records.run_folder.events import changed_names
 from swarmwire.metrics.records.run_folder.layout import RECORDING_END
 from swarmwire.metrics.records.run_folder.writer import ChunkLimit
 
@@ -86,7 +85,7 @@ class RerunRecording(Observer):
         self._arena_view.add(rows, truth)
         texts = [] if self._ticks else [f"the run begins: {self._static.robots} robots"]
         for event in truth.events:
-            robots = ", ".join(changed_names(event, self._static)[ARENA])
+            robots = ", ".join(event.changed_names(self._static)[ARENA])
             if event.singly and not robots:
                 continue
             texts.append(f"{event.words}: {robots or 'no robot'}")

@@ -5,7 +5,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
 import polars as pl
 
 from swarmwire.comms.base.clock import to_s
@@ -32,7 +31,7 @@ class EventLog(Observer):
     def see(self, truth: Truth) -> None:
         """Add the events of a tick."""
         for event in truth.events:
-            robots = changed_names(event, self._static)
+            robots = event.changed_names(self._static)
             self._events.append({**_entry(event, truth), "singly": event.singly, "robots": robots})
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
@@ -112,7 +111,7 @@ class EventRecorder(Observer):
         rows: list[dict[str, Any]] = [
             {**_entry(event, truth), "time_s": to_s(truth.time_ns), "arena": arena, "robots": robots}
             for event in truth.events
-            for arena, robots in enumerate(changed_names(event, self._static))
+            for arena, robots in enumerate(event.changed_names(self._static))
             if truth.running[arena] and (robots or not event.singly)
         ]
         self._writer.put(Chunk(len(rows), partial(pl.DataFrame, rows, schema=Events.types)))
@@ -121,12 +120,6 @@ class EventRecorder(Observer):
         """Join the parts."""
         self._writer.close()
         return {"record_events": {"rows": self._writer.rows, "dropped": self._writer.dropped}}
-
-
-def changed_names(event: EventRecord, static: Static) -> list[list[str]]:
-    """Return the names of the robots that an event changed, a list per arena."""
-    changed = event.changed.reshape(static.arenas, static.robots)
-    return [[static.robot_names[index] for index in np.flatnonzero(mask)] for mask in changed]
 
 
 def _row_count(event: Mapping[str, Any], ticks: list[int]) -> int:

@@ -26,13 +26,14 @@ POSE = ("x_m", "y_m", "heading_rad")  # arena frame
 VELOCITY = ("vx_mps", "vy_mps", "turn_radps")  # arena frame
 COMMAND = ("command_forward_mps", "command_turn_radps")  # within limits
 SIDEWAYS = "command_left_mps"  # within limits; only if a robot can move sideways
-MOTION = (*POSE, *VELOCITY, *COMMAND, SIDEWAYS)  # lists with a number per robot, float32
+HEIGHT = "z_m"  # of the lower side above the floor; only if a source moves robots
+MOTION = (*POSE, *VELOCITY, *COMMAND, SIDEWAYS, HEIGHT)  # lists with a number per robot, float32
 ROBOT_COLUMNS = (*POSE, *VELOCITY, *COMMAND, "alive", "state")  # lists with an item per robot, in every record
 VALUE = "value"  # a list with a number per robot, float64; from the first tick on in which a robot noted a value
 MOVABLE = ("movable_x_m", "movable_y_m", "movable_heading_rad")  # lists with a number per movable obstacle, if any
 RADIO = ("sent", "received", "in_range")  # packets, receivers and receivers since the previous tick
 KEYS = ("tick", "time_s", "arena", "seed")
-TICK_COLUMNS = (*KEYS, *ROBOT_COLUMNS, SIDEWAYS, VALUE, *MOVABLE, *RADIO)  # names that a metric cannot have
+TICK_COLUMNS = (*KEYS, *ROBOT_COLUMNS, SIDEWAYS, HEIGHT, VALUE, *MOVABLE, *RADIO)  # names that a metric cannot have
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from swarmwire.comms.robot.packets import Fate
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.records.run_folder.layout import (
     COMMAND,
+    HEIGHT,
     KEYS,
     MOTION,
     MOVABLE,
@@ -47,11 +48,11 @@ class Ticks(RecordedTable):
     """A row per tick and arena; lists have an item per robot in its order.
 
     Columns: tick, time_s, arena, seed; lists x_m, y_m, heading_rad, vx_mps, vy_mps, turn_radps (arena frame),
-    command_forward_mps, command_turn_radps (within limits) and, if a robot can move sideways, command_left_mps, all
-    float32, alive, state ("": none noted); if a robot ever noted a number, value (float64; null: none yet); if
-    obstacles are movable, lists movable_x_m, movable_y_m, movable_heading_rad with an item for each of them in the
-    scenario's order; each metric (a count's total so far; null: undefined); sent, received, in_range since the previous
-    tick (null without a radio).
+    command_forward_mps, command_turn_radps (within limits), command_left_mps if a robot can move sideways, and z_m
+    (height of the lower side) if a source moves robots, all float32, alive, state ("": none noted); if a robot ever
+    noted a number, value (float64; null: none yet); if obstacles are movable, lists movable_x_m, movable_y_m,
+    movable_heading_rad with an item for each of them in the scenario's order; each metric (a count's total so far;
+    null: undefined); sent, received, in_range since the previous tick (null without a radio).
     """
 
     name = "ticks"
@@ -167,6 +168,7 @@ class TickColumns:
         self._pose: AnyArray = np.empty((*robot_shape, len(POSE)), np.float32)
         self._velocity: AnyArray = np.empty((*robot_shape, len(VELOCITY)), np.float32)
         self._command: AnyArray = np.empty((*robot_shape, len(COMMAND) + 1), np.float32)
+        self._height_m: AnyArray = np.empty(robot_shape if static.any_followed else (0, 0, 0), np.float32)
         self._movable: AnyArray = np.empty((*shape, static.movable, len(MOVABLE)), np.float32)
         self._alive: AnyArray = np.empty(robot_shape, np.bool_)
         self._state: AnyArray = np.empty(robot_shape, np.uint32)
@@ -183,6 +185,8 @@ class TickColumns:
         self._pose[slot] = truth.pose.reshape(*shape, -1)
         self._velocity[slot] = truth.velocity.reshape(*shape, -1)
         self._command[slot] = truth.command.reshape(*shape, -1)
+        if truth.height_m is not None:
+            self._height_m[slot] = truth.height_m.reshape(shape)
         if truth.movable is not None:
             self._movable[slot] = truth.movable
         self._alive[slot] = truth.alive.reshape(shape)
@@ -217,6 +221,8 @@ class TickColumns:
         for names, values in ((POSE, self._pose), (VELOCITY, self._velocity), (command, self._command)):
             for index, name in enumerate(names):
                 columns[name] = np.ascontiguousarray(values[:ticks, ..., index]).reshape(per_robot)
+        if self._static.any_followed:
+            columns[HEIGHT] = self._height_m[:ticks].reshape(per_robot)
         columns["alive"] = self._alive[:ticks].reshape(per_robot)
         columns["state"] = pl.Series(self._states).gather(self._state[:ticks].reshape(-1)).reshape(per_robot)
         if self._value is not None:
@@ -235,7 +241,8 @@ class TickColumns:
 def robot_columns(static: Static) -> tuple[str, ...]:
     """Return the columns that are lists with an item per robot."""
     sideways = any(isinstance(group.body.drive, Holonomic) for group in static.groups)
-    return (*ROBOT_COLUMNS, SIDEWAYS) if sideways else ROBOT_COLUMNS
+    heights = (HEIGHT,) if static.any_followed else ()
+    return (*ROBOT_COLUMNS, *((SIDEWAYS,) if sideways else ()), *heights)
 
 
 def movable_columns(static: Static) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.obstacle_index import obstacles_within
 from swarmwire.world.engines.discs.contacts import fill_contacts, split_by_contact
@@ -37,6 +38,8 @@ def robots_of(config: EngineConfig, arenas: int) -> AnyArray:
     robots["max_step_mps"] = motors.max_force_n * step_s / motors.mass_kg
     robots["max_step_radps"] = motors.max_torque_nm * step_s / motors.inertia_kgm2
     robots["half_base_m"] = 0.5 * motors.wheel_base_m
+    for column in ("per_kg", "per_kgm2", "max_step_mps", "max_step_radps"):  # nothing changes their speeds
+        robots[column][config.followed] = 0.0
     robots["cos"] = 1.0  # `middle_rad` is 0
     return np.tile(robots, arenas)
 
@@ -70,18 +73,41 @@ class DiscsEngine:
         self._fixed = Fixed(half_size_m, obstacles.circle, obstacles.side_start, obstacles.side)
         self._near = NearBodies(0.0, np.zeros(0, CONTACT_RECORD), *(np.zeros(0, np.int64) for _ in range(3)))
         self._set_margin(MARGIN * self._params.max_radius_m)
+        self._followed: IntArray = np.flatnonzero(config.followed)
+        self._end: FloatArray | None = None  # states of the followed robots at the end of the tick
         self._list_near(0.0)
 
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick towards targets (arenas, robots, 3): see `Engine`."""
         onsets = np.zeros((len(target), 2), np.int64)
-        targets = target.reshape(len(self._bodies.state), 3)
-        step = 0
+        targets, end, step = target.reshape(len(self._bodies.state), 3), self._end, 0
+        if end is not None:
+            targets = self._start_followed(end, target).reshape(targets.shape)
         while True:
             step, fastest_mps = advance(step, self._params, self._bodies, targets, self._near, self._fixed, onsets)
             if step == self._params.steps:
+                if end is not None:
+                    self.state[self._of_running] = end[self._running]
                 return onsets
             self._list_near(fastest_mps)
+
+    def follow(self, end: FloatArray) -> None:
+        """Set the states of the followed robots at the end of the next tick, (arenas, k, 6)."""
+        self._end = end
+
+    @property
+    def _of_running(self) -> tuple[AnyArray, ...]:
+        """The index of the followed robots of running arenas in `state`."""
+        return np.ix_(np.flatnonzero(self._running), self._followed)
+
+    def _start_followed(self, end: FloatArray, target: FloatArray) -> FloatArray:
+        """Give the followed robots their velocities, and return the targets (arenas, robots, 3) with their speeds."""
+        target, velocity = target.copy(), end[self._running][:, :, 3:]
+        self.state[:, :, 3:][self._of_running] = velocity
+        robots = self._bodies.robots.reshape(self.touched.shape)
+        robots["unhindered_radps"][self._of_running] = velocity[:, :, 2]
+        target[:, :, 0][self._of_running] = portable.hypot(velocity[:, :, 0], velocity[:, :, 1])
+        return target
 
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, robots, 2) in m/s."""
@@ -109,6 +135,9 @@ class DiscsEngine:
         robots, state, margin_m = self._bodies.robots, self._bodies.state, self._margin_m
         pairs = pairs_near(robots, state, self._running, self._config.size_m, max_radius_m, margin_m)
         fixed_pairs = fixed_near(robots, state, self._running, self._index, margin_m)
+        if len(self._followed):  # contacts need a robot that gives way
+            moves = robots["per_kg"] > 0.0
+            pairs, fixed_pairs = pairs[moves[pairs].any(axis=1)], fixed_pairs[moves[fixed_pairs[:, 0]]]
         contacts = np.zeros(len(pairs) + len(fixed_pairs), CONTACT_RECORD)
         fill_contacts(contacts, robots, pairs, fixed_pairs, self._near.contacts)
         moving = np.repeat(self._running, self._params.per_arena)

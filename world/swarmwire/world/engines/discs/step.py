@@ -265,10 +265,14 @@ def _split_by_mass(contact, robots, overlap_m):
 @kernel()
 def _split_equally(contact, robots, state, overlap_m, dt_s):
     """Set both sides back by the same distance, regardless of mass: few sweeps reach from a wall through a crowd."""
-    if contact.kind == ROBOT:
+    moves = robots[contact.row].per_kg > 0.0  # followed robots do not give way
+    other_moves = contact.kind == ROBOT and robots[contact.other].per_kg > 0.0
+    if moves and other_moves:
         overlap_m *= 0.5
+    if other_moves:
         _set_back(robots[contact.other], state[contact.other], contact.nx, contact.ny, overlap_m, dt_s)
-    _set_back(robots[contact.row], state[contact.row], -contact.nx, -contact.ny, overlap_m, dt_s)
+    if moves:
+        _set_back(robots[contact.row], state[contact.row], -contact.nx, -contact.ny, overlap_m, dt_s)
 
 
 @kernel()

@@ -1,0 +1,211 @@
+"""Robots that others move: the shipped trace, and poses by UDP and of a tracker in real time."""
+
+import json
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Generator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarmwire.agent import pose_feed
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.comms.observe.truth import Truth
+from swarmwire.comms.wire.network import Network
+from swarmwire.comms.wire.robot_network import open_swarm
+from swarmwire.deploy import repeat, run
+from swarmwire.metrics.records.run_folder.reader import RunFolder
+from tests.support.deploy.runs import ROOT, swarmwire
+
+TRACED = ROOT / "scenarios" / "traced.toml"
+UDP = ROOT / "examples" / "motion" / "udp.toml"
+ROWS = """
+format = 1
+name = "poses from outside"
+duration_s = 2.0
+time = {{ rate_hz = 20 }}
+arena = {{ size_m = [40.0, 10.0] }}
+[robots.row]
+body = "epuck2"
+count = 2
+agent = "swarmwire.agent.behaviours:Consensus"
+motion = {{ source = "{source}", {settings} }}
+[radio]
+range_m = 5.0
+"""
+
+
+def free_port(kind: socket.SocketKind) -> int:
+    """A port that the system chose; a moment later it is still free, or the test fails aloud."""
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def sending(send: Callable[[int], None], rate_hz: int = 50) -> Generator[None]:
+    """Call `send` with 0, 1, … at a rate within the context."""
+    over = Event()
+
+    def go() -> None:
+        k = 0
+        while not over.wait(1.0 / rate_hz):
+            send(k)
+            k += 1
+
+    thread = Thread(target=go)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+def scenario(folder: Path, source: str, settings: str) -> Path:
+    """A scenario of two robots with this source."""
+    path = folder / "rows.toml"
+    path.write_text(ROWS.format(source=source, settings=settings))
+    return path
+
+
+def test_traced_run_is_the_same_with_agents_in_this_process_and_in_two_others():
+    alone, apart = (run(TRACED, overrides=["duration_s=5"], runners=runners) for runners in (None, 2))
+    assert alone.trajectory_sha256 == apart.trajectory_sha256
+    assert alone.radio == apart.radio
+    assert alone.radio is not None
+    assert alone.radio.fates["received"] > 0
+
+
+def test_traced_run_repeats_from_its_folder_alone(tmp_path):
+    first = run(TRACED, overrides=["duration_s=2"], out=tmp_path / "run")
+    assert (tmp_path / "run" / "files" / "walk.movements").is_file()
+    again = repeat(tmp_path / "run")
+    assert again.same
+    assert again.result.radio == first.radio
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".movements", ".tcl"])
+def test_traced_run_can_be_exported_and_followed_again(tmp_path, suffix):
+    overrides = ["duration_s=3", "robots.walkers.motion.start_s=40"]
+    first, file = run(TRACED, overrides=overrides, out=tmp_path / "run"), tmp_path / f"walk{suffix}"
+    assert swarmwire("export", tmp_path / "run", "--to", file).returncode == 0
+    shift_m = -200 if suffix != ".csv" else 0
+    motion = [f'robots.walkers.motion.file="{file}"', f"robots.walkers.motion.offset_m=[{shift_m}, {shift_m}]"]
+    again = run(TRACED, overrides=["duration_s=3", *motion], out=tmp_path / "again")
+    before, after = (RunFolder(tmp_path / name).ticks() for name in ("run", "again"))
+    for column in ("x_m", "y_m"):
+        assert after[column].to_numpy() == pytest.approx(before[column].to_numpy(), abs=1e-4)
+    assert again.radio is not None
+    assert first.radio is not None
+    assert again.radio.fates["received"] == pytest.approx(first.radio.fates["received"], rel=0.02)
+
+
+def test_udp_poses_decide_who_is_in_range_and_the_run_repeats_without_them(tmp_path):
+    port = free_port(socket.SOCK_DGRAM)
+    path = scenario(tmp_path, "udp", f'listen = "127.0.0.1:{port}"')
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    class Away(Event, Observer):
+        """Set from the middle of the run on."""
+
+        def see(self, truth: Truth) -> None:
+            if truth.tick == 20:
+                self.set()
+
+    away = Away()
+
+    def send(_: int) -> None:
+        x_m = 8.0 if away.is_set() else 3.0  # the range is 5 m
+        for name, x in (("row-0", 0.0), ("row-1", x_m), ("ghost", 0.0)):
+            message: dict[str, Any] = {"robot": name, "x_m": x, "y_m": 0.0, "heading_rad": 0.5}
+            sender.sendto(json.dumps(message).encode(), ("127.0.0.1", port))
+        sender.sendto(b"{", ("127.0.0.1", port))
+
+    with sender, sending(send):
+        result = run(path, realtime=1.0, out=tmp_path / "run", observers=[away])
+    assert result.radio is not None
+    assert result.radio.fates["received"] > 20
+    assert result.radio.fates["out_of_range"] > 10
+    assert result.counts["poses_of_unknown"] > 0
+    assert result.counts["poses_malformed"] > 0
+    assert result.poses[0].received > 20
+    assert set(result.poses[0].longest_gap_s) == {"row-0", "row-1"}
+    again = repeat(tmp_path / "run")
+    assert again.same
+    assert again.result.radio == result.radio
+
+
+def test_tracker_poses_move_robots(tmp_path):
+    port = free_port(socket.SOCK_STREAM)
+    path = scenario(tmp_path, "zenoh", f'swarm = "arena", listen = ["tcp/127.0.0.1:{port}"]')
+    feed = Feed()
+    thread = Thread(target=feed.run, args=(f"tcp/127.0.0.1:{port}",))
+    thread.start()
+    try:
+        result = run(path, realtime=1.0)
+    finally:
+        feed.over.set()
+        thread.join()
+    assert result.poses[0].received > 0
+    assert result.radio is not None
+    assert result.radio.fates["received"] > 0
+
+
+class Feed:
+    """The standing robots that `pose_feed` publishes."""
+
+    def __init__(self) -> None:
+        self.over = Event()
+
+    def lines(self) -> Generator[str]:
+        while not self.over.wait(0.02):
+            yield "row-0 0 0 0\n"
+            yield "row-1 1 0 0\n"
+
+    def run(self, endpoint: str) -> None:
+        with closing(open_swarm(Network(connect=(endpoint,)))) as session:
+            while not self.over.is_set() and pose_feed._feed(session, "arena", 1, self.lines()):
+                pass
+
+
+@pytest.mark.parametrize(("options", "key"), [({}, "source"), ({"realtime": 1.0, "seeds": 2}, "source")])
+def test_live_poses_need_real_time_and_one_seed(tmp_path, options, key):
+    with pytest.raises(BadInput) as error:
+        run(scenario(tmp_path, "udp", 'listen = "127.0.0.1:0"'), **options)
+    assert error.value.key == f"robots.row.motion.{key}"
+
+
+@pytest.mark.parametrize("listen", ["nowhere", "127.0.0.1:99999", "192.0.2.1:9870"])
+def test_udp_address_that_cannot_be_used_is_refused(tmp_path, listen):
+    with pytest.raises(BadInput) as error:
+        run(scenario(tmp_path, "udp", f'listen = "{listen}"'), realtime=1.0)
+    assert error.value.key == "robots.row.motion.listen"
+
+
+def test_simulator_example_moves_ten_robots_apart(tmp_path):
+    port = free_port(socket.SOCK_DGRAM)
+    simulator = subprocess.Popen(
+        [sys.executable, ROOT / "examples" / "motion" / "simulator.py", f"127.0.0.1:{port}", "100"]
+    )
+    try:
+        overrides = ["duration_s=6", f'robots.row.motion.listen="127.0.0.1:{port}"']
+        result = run(UDP, realtime=1.0, overrides=overrides, out=tmp_path / "run")
+    finally:
+        simulator.kill()
+        simulator.wait()
+    assert result.counts.get("poses_malformed", 0) == 0
+    assert result.poses[0].received > 6 * 20 * 10 * 0.8
+    ticks = RunFolder(tmp_path / "run").ticks()
+    gap_m = np.diff(ticks["x_m"].to_numpy(), axis=1)
+    assert gap_m[-1] == pytest.approx(gap_m[-1, 0], rel=1e-3)
+    assert (
+        gap_m[-1, 0] > gap_m[5, 0] + 3.0
+    )  # 60 m x (1 - cos(2 pi 6 / 40)) / 2 after 6 s: 12 m, less what the start took
+    assert not ticks["z_m"].to_numpy().any()

@@ -1,0 +1,158 @@
+"""Robots of a scenario that a source moves."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.robot.tick_io import Actions, SparseTable
+from swarmwire.world.scenario_file import scenario_from
+from swarmwire.world.world import World
+
+STILL = Actions.joined([])
+CSV = """t_s,robot,x_m,y_m,z_m,heading_rad
+0,a,1,0,2,0
+1,a,2,0,3,1
+0,b,-1,-1,0,3
+1,b,-1,-1,0,-3
+"""
+
+
+def mapping(motion: object, count: int = 2, **tables: object) -> dict[str, object]:
+    group = {"body": "epuck", "count": count, "agent": "swarmwire.agent.behaviours:Consensus", "motion": motion}
+    return {
+        "format": 1,
+        "name": "followed",
+        "duration_s": 1.0,
+        "arena": {"size_m": [10.0, 10.0]},
+        "robots": {"led": group},
+        **tables,
+    }
+
+
+def traced(folder: Path, text: str = CSV, **settings: object) -> dict[str, object]:
+    (folder / "motion.csv").write_text(text)
+    return {"source": "trace", "file": str(folder / "motion.csv"), **settings}
+
+
+def world_of(table: dict[str, object], seeds: tuple[int, ...] = (1,)) -> World:
+    return World(scenario_from(table, "test"), seeds, {})
+
+
+def test_trace_moves_robots_from_sample_to_sample_in_all_arenas(tmp_path: Path) -> None:
+    world = world_of(mapping(traced(tmp_path)), (1, 2))
+    assert world.pose[[0, 1, 2, 3]].tolist() == [[1.0, 0.0, 0.0], [-1.0, -1.0, 3.0]] * 2
+    assert world.radio_pose[:, 3].tolist() == [2.0, 0.0] * 2
+    for _ in range(5):
+        world.move(STILL)
+    assert world.pose[[0, 2]] == pytest.approx(np.array([[1.5, 0.0, 0.5]] * 2))
+    assert world.velocity[0] == pytest.approx([1.0, 0.0, 1.0])
+    assert abs(world.pose[1, 2]) == pytest.approx(np.pi, abs=1e-9)  # the short way from 3 to -3 rad
+    assert world.velocity[1, 2] == pytest.approx(2.0 * np.pi - 6.0)
+    assert world.radio_pose[:, 3] == pytest.approx([2.5, 0.0] * 2)
+    for _ in range(20):
+        world.move(STILL)
+    assert world.pose[0] == pytest.approx([2.0, 0.0, 1.0])
+    assert world.velocity[0].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_trace_begins_at_its_start_with_its_offset_and_chosen_robots(tmp_path: Path) -> None:
+    world = world_of(mapping(traced(tmp_path, start_s=0.5, offset_m=[0.5, -1.0], robots=["b", "a"])))
+    assert world.pose[1] == pytest.approx([2.0, -1.0, 0.5])
+    assert world.pose[0, :2] == pytest.approx([-0.5, -2.0])
+
+
+def test_commands_to_followed_robots_are_ignored_and_counted(tmp_path: Path) -> None:
+    world = world_of(mapping(traced(tmp_path)))
+    rows = np.arange(2)
+    drive = Actions(rows, np.ones(2, np.bool_), np.full(2, 0.1), np.zeros(2), np.zeros(2))
+    world.move(drive)
+    assert world.counts()["commands_to_followed"].tolist() == [2]
+    assert not world.command.any()
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [
+        ({"file": "missing.csv"}, "robots.led.motion.file"),
+        ({"robots": ["a", "c"]}, "robots.led.motion.robots"),
+        ({"robots": ["a"]}, "robots.led.motion"),
+        ({"origin": [0.0, 0.0, 0.0]}, "robots.led.motion.origin"),
+        ({"offset_m": [4.5, 0.0]}, "robot a"),
+    ],
+)
+def test_trace_that_does_not_fit_names_key_or_robot(tmp_path: Path, change: dict[str, object], key: str) -> None:
+    with pytest.raises(BadInput) as error:
+        world_of(mapping({**traced(tmp_path), **change}))
+    assert error.value.key == key
+
+
+def test_trace_of_more_robots_than_the_group_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput) as error:
+        world_of(mapping(traced(tmp_path), count=1))
+    assert error.value.key == "robots.led.motion"
+
+
+def test_torus_has_no_followed_robots(tmp_path: Path) -> None:
+    table = mapping(traced(tmp_path), arena={"size_m": [10.0, 10.0], "boundary": "torus"})
+    with pytest.raises(BadInput) as error:
+        scenario_from(table, "test")
+    assert error.value.key == "robots.led.motion"
+
+
+def test_live_robot_stands_where_it_was_placed_until_its_first_pose() -> None:
+    place = {"how": "poses", "poses": [[0.0, 1.0, 0.5], [2.0, 1.0, 0.0]]}
+    table = mapping({"source": "udp"})
+    table["robots"]["led"]["place"] = place  # type: ignore[index]
+    world = world_of(table)
+    world.move(STILL)
+    assert world.pose[:, :2].tolist() == [[0.0, 1.0], [2.0, 1.0]]
+    new = SparseTable(np.array([1, 1, 1, 1]), np.arange(4), np.array([-3.0, 2.0, 1.5, 1.0]))
+    world.move(Actions(*(np.empty(0, kind) for kind in (np.int64, np.bool_, float, float, float)), poses=new))
+    assert world.pose[1].tolist() == [-3.0, 2.0, 1.0]
+    assert world.velocity[1].tolist() == [0.0, 0.0, 0.0]  # set there, not moved there
+    assert world.radio_pose[:, 3].tolist() == [0.0, 1.5]
+    new = SparseTable(np.array([1, 1]), np.arange(2), np.array([-2.9, 2.0]))
+    world.move(Actions(*(np.empty(0, kind) for kind in (np.int64, np.bool_, float, float, float)), poses=new))
+    assert world.velocity[1] == pytest.approx([1.0, 0.0, 0.0])
+    world.move(STILL)
+    assert world.pose[1] == pytest.approx([-2.9, 2.0, 1.0])
+    assert world.velocity[1].tolist() == [0.0, 0.0, 0.0]
+
+
+ORBIT = """
+from dataclasses import dataclass
+import numpy as np
+from swarmwire.world.motion.source import PoseSource
+
+@dataclass
+class Orbit(PoseSource):
+    count: int
+    speed_mps: float
+    rows: int = 0
+
+    def at(self, time_s):
+        x = self.speed_mps * time_s + np.arange(self.count)
+        return np.stack([x, 0 * x, 0 * x, 0 * x], axis=1)[self.rows:]
+"""
+
+
+def test_custom_source_moves_robots_and_its_faults_name_the_key(tmp_path: Path) -> None:
+    (tmp_path / "orbit.py").write_text(ORBIT)
+    motion = {"source": "custom", "kind": f"{tmp_path / 'orbit.py'}:Orbit", "params": {"speed_mps": 0.5}}
+    world = world_of(mapping(motion))
+    for _ in range(10):
+        world.move(STILL)
+    assert world.pose[:, 0] == pytest.approx([0.5, 1.5])
+    for params, key in (({}, "params"), ({"speed_mps": float("nan")}, ""), ({"speed_mps": 1.0, "rows": 1}, "")):
+        with pytest.raises(BadInput) as error:
+            world_of(mapping({**motion, "params": params}))
+        assert error.value.key == f"robots.led.motion{'.' if key else ''}{key}"
+
+
+def test_followed_group_beside_robots_that_drive_shares_their_engine(tmp_path: Path) -> None:
+    table = mapping(traced(tmp_path))
+    assert world_of(table).engines == ("kinematic",)
+    robots = {**table["robots"], "free": {"body": "epuck", "count": 1, "agent": "swarmwire.agent.behaviours:Diffusion"}}  # type: ignore[dict-item]
+    assert world_of({**table, "robots": robots}).engines == ("discs",)

@@ -1,0 +1,157 @@
+"""Poses as they arrive: which are used, which are counted, and how old they are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
+from swarmwire.comms.robot.tick_io import Actions, Readings
+from swarmwire.world.motion.live import FollowingBackend, LiveSource
+from swarmwire.world.scenario.motion import UdpMotion
+from tests.support.clocks import FakeClock
+
+NAN = float("nan")
+
+
+class Given(LiveSource):
+    """A source whose poses the test puts."""
+
+    address = "given"
+
+    def open(self) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+def given(clock: FakeClock, **settings: float) -> Given:
+    motion = UdpMotion(source="udp").model_copy(update=settings)
+    return Given(motion, ["a-0", "a-1"], [4, 5], (10.0, 5.0), clock)
+
+
+def poses(source: LiveSource) -> dict[int, dict[int, float]]:
+    """New poses by row and slot."""
+    table = source.pop_new()
+    rows: dict[int, dict[int, float]] = {}
+    for row, slot, value in zip(table.rows.tolist(), table.slot.tolist(), table.value.tolist(), strict=True):
+        rows.setdefault(row, {})[slot] = value
+    return rows
+
+
+def test_pose_is_given_once_to_the_row_of_its_robot() -> None:
+    source = given(FakeClock())
+    source.put("a-1", 1.0, 2.0, 3.0, 0.5)
+    assert poses(source) == {5: {0: 1.0, 1: 2.0, 2: 3.0, 3: 0.5}}
+    assert poses(source) == {}
+    assert source.missing() == ["a-0"]
+
+
+def test_pose_without_height_and_heading_keeps_those_before() -> None:
+    source = given(FakeClock())
+    source.put("a-0", 1.0, 2.0, NAN, NAN)
+    assert poses(source) == {4: {0: 1.0, 1: 2.0}}
+    source.put("a-0", 1.0, 2.0, 3.0, 0.5)
+    source.put("a-0", 1.05, 2.0, NAN, NAN)
+    assert poses(source) == {4: {0: 1.05, 1: 2.0, 2: 3.0, 3: 0.5}}
+
+
+@pytest.mark.parametrize(
+    ("pose", "count"),
+    [
+        (("b-0", 0.0, 0.0, 0.0, 0.0), "poses_of_unknown"),
+        (("a-0", NAN, 0.0, 0.0, 0.0), "poses_malformed"),
+        (("a-0", 0.0, float("inf"), 0.0, 0.0), "poses_malformed"),
+        (("a-0", 0.0, 0.0, float("-inf"), 0.0), "poses_malformed"),
+        (("a-0", 10.5, 0.0, 0.0, 0.0), "poses_outside"),
+        (("a-0", 0.0, -5.5, 0.0, 0.0), "poses_outside"),
+    ],
+)
+def test_pose_that_cannot_be_used_is_counted_and_changes_nothing(
+    pose: tuple[str, float, float, float, float], count: str
+) -> None:
+    source = given(FakeClock())
+    source.put(*pose)
+    assert (poses(source), source.counts()) == ({}, {count: 1})
+
+
+def test_jump_is_ignored_until_its_speed_would_be_allowed() -> None:
+    clock = FakeClock()
+    source = given(clock, max_speed_mps=2.0, max_age_s=100.0)
+    source.put("a-0", 0.0, 0.0, 0.0, 0.0)
+    clock.time_ns += NS_PER_S
+    source.put("a-0", 6.0, 0.0, 0.0, 0.0)
+    source.put("a-1", 0.0, 0.0, 0.0, 0.0)
+    assert poses(source)[4] == {0: 0.0, 1: 0.0, 2: 0.0, 3: 0.0}
+    assert source.counts() == {"poses_jumped": 1}
+    clock.time_ns += 2 * NS_PER_S
+    source.put("a-0", 6.0, 0.0, 0.0, 0.0)
+    assert poses(source)[4][0] == 6.0
+
+
+def test_age_beyond_the_limit_counts_ticks_and_shows_in_the_report() -> None:
+    clock = FakeClock()
+    source = given(clock, max_age_s=1.0)
+    source.put("a-0", 0.0, 0.0, 0.0, 0.0)
+    source.put("a-1", 0.0, 0.0, 0.0, 0.0)
+    for _ in range(4):
+        clock.time_ns += NS_PER_S // 2
+        source.put("a-1", 0.0, 0.0, 0.0, 0.0)
+        source.pop_new()
+    report = source.report()
+    assert report.longest_gap_s == {"a-0": 2.0, "a-1": 0.0}
+    assert (report.silent_ticks, report.received) == ({"a-0": 2}, 6)
+    assert source.counts() == {"ticks_without_pose": 2}
+
+
+class StandingAgents:
+    """A backend without any actions."""
+
+    def start(self) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def counts(self) -> dict[str, int]:
+        return {"late": 3}
+
+    def act(self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: object) -> Actions:
+        return Actions.joined([])
+
+
+def test_following_backend_waits_for_all_poses_and_adds_them_to_the_actions() -> None:
+    clock = FakeClock()
+    source, lines = given(clock), list[str]()
+    source.put("a-0", 1.0, 0.0, 0.0, 0.0)
+
+    class PuttingClock(FakeClock):
+        def sleep_until(self, at_ns: int) -> None:
+            super().sleep_until(at_ns)
+            source.put("a-1", 2.0, 0.0, 0.0, 0.0)
+
+    backend = FollowingBackend(StandingAgents(), [source], PuttingClock(), lines.append, lambda: False)
+    backend.start()
+    assert len(lines) == 1
+    assert "a-1" in lines[0]
+    actions = backend.act(0, {}, ReceivedPackets.none(), NO_TX_STATUSES)
+    assert set(actions.poses.rows.tolist()) == {4, 5}
+    assert backend.counts() == {"late": 3}
+
+
+def test_following_backend_refuses_a_robot_without_a_pose_in_time() -> None:
+    clock = FakeClock()
+    source = given(clock, wait_s=2.0)
+    source.put("a-0", 1.0, 0.0, 0.0, 0.0)
+    with pytest.raises(BadInput, match="a-1"):
+        FollowingBackend(StandingAgents(), [source], clock, lambda _: None, lambda: False).start()
+    assert clock.time_ns == pytest.approx(2.0 * NS_PER_S, rel=0.05)
+
+
+def test_following_backend_stops_waiting_as_the_run_ends() -> None:
+    clock = FakeClock()
+    FollowingBackend(StandingAgents(), [given(clock)], clock, lambda _: None, lambda: True).start()
+    assert replace(Actions.joined([])).poses.rows.tolist() == np.empty(0).tolist()

@@ -1,0 +1,87 @@
+"""Robots that a source moves: where they are at the end of each tick."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from swarmwire.comms.base.angles import wrap_angles
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.observe.truth import Group
+from swarmwire.comms.robot.tick_io import SparseTable
+from swarmwire.world.motion.source import PoseSource
+
+
+class FollowedRobots:
+    """The robots of all groups that a source moves; they move alike in all arenas.
+
+    A robot moves on a straight line, with constant speed, from its pose at a tick's start to that at its end. A robot
+    of a live source stands where it was placed until its first pose, which sets it there without a speed; it keeps each
+    pose until the next one arrives.
+
+    Attributes:
+        mask: (robots,) True for the robot indices that a source moves.
+        index: (k,) these robot indices, rising.
+    """
+
+    def __init__(self, groups: Sequence[Group], sources: Mapping[str, PoseSource], rate_hz: int) -> None:
+        """`sources` has the source in lockstep of each group; followed groups without one have a live source."""
+        self._rate_hz, self._ticks = rate_hz, 0
+        self._groups = [group for group in groups if group.followed]
+        self._sources = sources
+        self.mask: BoolArray = np.zeros(groups[-1].stop, np.bool_)
+        for group in self._groups:
+            self.mask[group.start : group.stop] = True
+        self.index: IntArray = np.flatnonzero(self.mask)
+        self._column = np.cumsum(self.mask) - 1  # robot index -> column in the arrays (k,)
+        self._pose = np.zeros((len(self.index), 4))  # x, y, z in m, heading in rad
+        for group in self._groups:
+            self._pose[self._columns(group), 2] = group.body.altitude_m
+        self._has_pose = np.zeros(len(self.index), np.bool_)  # False: its live source has given no pose yet
+        self._is_live = self.mask.copy()
+        for group in self._groups:
+            if group.name in sources:
+                self._is_live[group.start : group.stop] = False
+        self._read(0.0)
+
+    @property
+    def altitude_m(self) -> FloatArray:
+        """Height of the lower side of each robot above the floor, (k,)."""
+        return self._pose[:, 2]
+
+    def end_states(self, state: FloatArray, poses: SparseTable) -> FloatArray:
+        """Return the states at the end of the next tick, (arenas, k, 6), and count the tick.
+
+        Args:
+            state: (arenas, robots, 6) the present state of all robots.
+            poses: new poses of robots with a live source, in slots x, y, z, heading.
+        """
+        self._ticks += 1
+        now, had_pose = state[:, self.index], self._has_pose.copy()
+        if len(poses):
+            robot = poses.rows % len(self.mask)
+            poses = poses.select(np.flatnonzero(self._is_live[robot]))
+            column = self._column[poses.rows % len(self.mask)]
+            self._pose[column, poses.slot] = poses.value
+            self._has_pose[column] = True
+        self._read(self._ticks / self._rate_hz)
+        end = now.copy()
+        end[:, :, 3:] = 0.0
+        moved, speeds = self._has_pose, had_pose & self._has_pose
+        end[:, moved, :2] = self._pose[moved, :2]
+        end[:, moved, 2] += wrap_angles(self._pose[moved, 3] - now[:, moved, 2])
+        end[:, speeds, 3:] = (end[:, speeds, :3] - now[:, speeds, :3]) * self._rate_hz
+        return end
+
+    def start_poses(self) -> dict[str, FloatArray]:
+        """Return x, y in m and heading in rad at the start, (count, 3), of each group with a source in lockstep."""
+        groups = (group for group in self._groups if group.name in self._sources)
+        return {group.name: self._pose[self._columns(group)][:, (0, 1, 3)] for group in groups}
+
+    def _columns(self, group: Group) -> slice:
+        return slice(int(self._column[group.start]), int(self._column[group.stop - 1]) + 1)
+
+    def _read(self, time_s: float) -> None:
+        for group in self._groups:
+            if group.name in self._sources:
+                columns = self._columns(group)
+                self._pose[columns], self._has_pose[columns] = self._sources[group.name].at(time_s), True

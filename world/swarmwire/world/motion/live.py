@@ -1,0 +1,205 @@
+"""Live sources: the newest pose of each robot as it arrives, and a backend that adds new poses to a tick's actions."""
+
+import math
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.clock import Clock, to_ns, to_s
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.observe.interfaces import AgentBackend, SubtickMedium, TimedBackend
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
+from swarmwire.world.scenario.motion import LiveMotion
+
+POLL_NS = to_ns(0.02)  # interval of polls for the first poses
+NEVER_ARRIVED_NS = -1
+POSITION_NOISE_M = 0.1  # two poses may arrive together: a difference up to this is no jump
+
+
+@dataclass(frozen=True)
+class PosesReport:
+    """The poses of one group's live source over a run."""
+
+    source: str  #: its address
+    received: int  #: usable poses
+    longest_gap_s: dict[str, float]  #: by robot: the greatest age of its newest pose at a tick, wall time
+    silent_ticks: dict[str, int]  #: by robot, if any: ticks at which its newest pose was older than `max_age_s`
+
+
+class LiveSource(ABC):
+    """The poses of one group's robots as they arrive; `put` may be called from any thread.
+
+    A pose is ignored, and counted, if it is malformed, of an unknown robot, outside the arena, or a jump: farther from
+    the last one than `max_speed_mps` allows in the time between. After a jump that was none the next poses are used as
+    soon as this time has passed.
+
+    Attributes:
+        address: where poses arrive; known from `open` on.
+    """
+
+    address: str
+
+    def __init__(
+        self, motion: LiveMotion, names: Sequence[str], rows: Sequence[int], half_m: tuple[float, float], clock: Clock
+    ) -> None:
+        """Make a source that has received nothing.
+
+        Args:
+            motion: its table.
+            names: names of the robots.
+            rows: their robot rows.
+            half_m: poses lie within this distance of the arena's origin along x and y; inf: an arena without walls.
+            clock: dates arrivals.
+        """
+        self.motion, self.names = motion, tuple(names)
+        self._rows = np.array(rows, np.int64)
+        self._index_of = {name: index for index, name in enumerate(names)}
+        self._half_m, self._clock = half_m, clock
+        self._pose: FloatArray = np.full((len(names), 4), np.nan)  # x, y, z in m, heading in rad
+        self._arrived_ns = [NEVER_ARRIVED_NS] * len(names)
+        self._is_new = [False] * len(names)
+        self._counted = Counter[str]()
+        self._received, self._longest_ns, self._silent = 0, [0] * len(names), [0] * len(names)
+
+    @abstractmethod
+    def open(self) -> None:
+        """Begin to receive; BadInput if the address is in use or cannot be used."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Stop receiving; safe to call more than once."""
+
+    def put(self, name: str, x_m: float, y_m: float, z_m: float, heading_rad: float) -> None:
+        """Take a pose that arrived now; z and heading are NaN if the source does not give them: they stay."""
+        index = self._index_of.get(name)
+        if index is None:
+            self._counted["poses_of_unknown"] += 1
+        elif not (math.isfinite(x_m) and math.isfinite(y_m)) or math.isinf(z_m) or math.isinf(heading_rad):
+            self._counted["poses_malformed"] += 1
+        elif abs(x_m) > self._half_m[0] or abs(y_m) > self._half_m[1]:
+            self._counted["poses_outside"] += 1
+        else:
+            self._keep(index, x_m, y_m, z_m, heading_rad)
+
+    def _keep(self, index: int, x_m: float, y_m: float, z_m: float, heading_rad: float) -> None:
+        now_ns, pose = self._clock.now_ns(), self._pose[index]
+        if self._arrived_ns[index] != NEVER_ARRIVED_NS:
+            away_m = math.hypot(x_m - pose[0], y_m - pose[1])
+            if away_m > self.motion.max_speed_mps * to_s(now_ns - self._arrived_ns[index]) + POSITION_NOISE_M:
+                self._counted["poses_jumped"] += 1
+                return
+        pose[0], pose[1] = x_m, y_m
+        if not math.isnan(z_m):
+            pose[2] = z_m
+        if not math.isnan(heading_rad):
+            pose[3] = heading_rad
+        self._arrived_ns[index], self._is_new[index] = now_ns, True
+        self._received += 1
+
+    def count(self, fault: str) -> None:
+        """Count a message that holds no pose."""
+        self._counted[fault] += 1
+
+    def missing(self) -> list[str]:
+        """Return the robots without a pose so far."""
+        pairs = zip(self.names, self._arrived_ns, strict=True)
+        return [name for name, arrived_ns in pairs if arrived_ns == NEVER_ARRIVED_NS]
+
+    def pop_new(self) -> SparseTable:
+        """Return the poses that are new since the last call, in slots x, y, z, heading; and count ages."""
+        now_ns, max_age_ns = self._clock.now_ns(), to_ns(self.motion.max_age_s)
+        for index, arrived_ns in enumerate(self._arrived_ns):
+            age_ns = now_ns - arrived_ns
+            self._longest_ns[index] = max(self._longest_ns[index], age_ns)
+            self._silent[index] += age_ns > max_age_ns
+        new = [index for index, is_new in enumerate(self._is_new) if is_new]
+        for index in new:
+            self._is_new[index] = False
+        return SparseTable.from_dense(self._rows[new], self._pose[new])
+
+    def counts(self) -> dict[str, int]:
+        """Return the numbers of unusable poses, and of ticks of silent robots, by name; only those above 0."""
+        silent = {"ticks_without_pose": sum(self._silent)}
+        return {name: count for name, count in {**self._counted, **silent}.items() if count}
+
+    def report(self) -> PosesReport:
+        """Return the report so far."""
+        gaps_s = dict(zip(self.names, map(to_s, self._longest_ns), strict=True))
+        silent = {name: ticks for name, ticks in zip(self.names, self._silent, strict=True) if ticks}
+        return PosesReport(self.address, self._received, gaps_s, silent)
+
+
+class FollowingBackend:
+    """A backend in real time that adds the new poses of live sources to the actions of each tick."""
+
+    def __init__(
+        self,
+        backend: AgentBackend | TimedBackend,
+        sources: Sequence[LiveSource],
+        clock: Clock,
+        report: Callable[[str], None],
+        is_stopped: Callable[[], bool],
+    ) -> None:
+        """`report` prints what the run waits for; `is_stopped` is true if the run must end."""
+        self._backend, self._sources, self._clock = backend, sources, clock
+        self._report, self._is_stopped = report, is_stopped
+        self.close = backend.close
+
+    def start(self) -> None:
+        """Start the agents, and return when every robot has a pose; BadInput if one has none in time."""
+        self._backend.start()
+        began_ns, reported = self._clock.now_ns(), ""
+        while not self._is_stopped():
+            waiting = [source for source in self._sources if source.missing()]
+            if not waiting:
+                return
+            now_ns = self._clock.now_ns()
+            for source in waiting:
+                if now_ns - began_ns > to_ns(source.motion.wait_s):
+                    raise _no_pose(source)
+            text = ", ".join(f"{source.address} ({_missing(source)})" for source in waiting)
+            if text != reported:
+                self._report(f"waits for the first poses from {text}")
+                reported = text
+            self._clock.sleep_until(now_ns + POLL_NS)
+
+    def act(
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
+    ) -> Actions:
+        """Return the actions of all robots in this tick, with new poses."""
+        return self._with_poses(self._backend.act(tick, readings, received, tx_status))
+
+    def act_in_time(
+        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
+    ) -> Actions:
+        """Act as the wrapped backend, and add new poses."""
+        timed = cast("TimedBackend", self._backend)
+        return self._with_poses(timed.act_in_time(tick, readings, received, tx_status, medium))
+
+    def counts(self) -> dict[str, int]:
+        """Return the numbers of faults of the backend and of the sources, by name."""
+        counted = Counter[str]()
+        for source in self._sources:
+            counted.update(source.counts())
+        return {**self._backend.counts(), **counted}
+
+    def _with_poses(self, actions: Actions) -> Actions:
+        return replace(actions, poses=SparseTable.joined([source.pop_new() for source in self._sources]))
+
+
+def _missing(source: LiveSource) -> str:
+    names = source.missing()
+    shown = ", ".join(names[:3])
+    return f"none yet of {shown}{f' and {len(names) - 3} others' if len(names) > 3 else ''}"
+
+
+def _no_pose(source: LiveSource) -> BadInput:
+    expected = f"expected a pose of each robot within {source.motion.wait_s:g} s: {_missing(source)}"
+    faults = ", ".join(f"{count} {name}" for name, count in source.counts().items() if name != "ticks_without_pose")
+    return BadInput(source.address, "", f"{expected}{f'; {faults}' if faults else ''}")

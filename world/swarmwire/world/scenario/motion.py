@@ -1,0 +1,72 @@
+"""The tables of [robots.<group>.motion]: sources of the poses of robots that others move."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from swarmwire.world.scenario.tables import Point, ScenarioTable
+
+
+class TraceMotion(ScenarioTable):
+    """Poses of a file: a trace of BonnMotion, ns-2 or EMANE, or a table."""
+
+    source: Literal["trace"]
+    """Poses of a file, which the robots follow in every arena."""
+    file: str = Field(min_length=1)
+    """Path, relative to the scenario: .movements, .movements.gz, .tcl, .ns_movements, .eel, .csv or .parquet."""
+    robots: tuple[str, ...] = Field(default=(), strict=False)
+    """Names or numbers of the file's robots, in the order of the group's; default: all, in the file's order."""
+    start_s: float = Field(default=0.0, ge=-1e9, le=1e9, json_schema_extra={"unit": "s"})
+    """Time in the file at which the run starts."""
+    offset_m: Point = (0.0, 0.0)
+    """Added to the file's x and y; files of BonnMotion and ns-2 begin at a corner, an arena's origin is its centre."""
+    origin: Annotated[tuple[float, float, float], Field(strict=False)] | None = None
+    """Latitude and longitude in degrees and altitude in m of the arena's origin; only, and always, for .eel."""
+
+
+class CustomMotion(ScenarioTable):
+    """Poses of a class of the user."""
+
+    source: Literal["custom"]
+    """Poses of a class of the user."""
+    kind: str = Field(min_length=1)
+    """The class, as module:Class or file.py:Class, below swarmwire.world.motion.source.PoseSource."""
+    params: dict[str, Any] = Field(default_factory=dict)
+    """Its parameters."""
+
+
+class _LiveMotion(ScenarioTable):
+    """Poses as they arrive; only in real time, with one seed."""
+
+    max_age_s: float = Field(default=1.0, gt=0, le=3600, json_schema_extra={"unit": "s"})
+    """A robot without a new pose for this time counts as silent; it keeps its last pose."""
+    max_speed_mps: float = Field(default=100.0, gt=0, le=1e5, json_schema_extra={"unit": "m/s"})
+    """A pose that is farther from the last one than this speed allows is a jump: it is counted and ignored."""
+    wait_s: float = Field(default=30.0, gt=0, le=86_400, json_schema_extra={"unit": "s"})
+    """Time for which the run waits for the first pose of each robot."""
+
+
+class UdpMotion(_LiveMotion):
+    """Poses by UDP, one JSON object a datagram."""
+
+    source: Literal["udp"]
+    """Poses by UDP, one JSON object a datagram."""
+    listen: str = Field(default="127.0.0.1:9870", min_length=1)
+    """Address and port on which they are received; port 0: a free port, which the run prints."""
+
+
+class TrackerMotion(_LiveMotion):
+    """Poses of a tracker on the robots' network, such as a camera above a real arena."""
+
+    source: Literal["zenoh"]
+    """Poses on the key pose/NAME of a swarm's network, as a tracker publishes them."""
+    swarm: str = Field(min_length=1)
+    """Name of the swarm."""
+    listen: tuple[str, ...] = Field(default=(), strict=False)
+    """Endpoints at which the tracker connects, such as "tcp/127.0.0.1:7447"."""
+    connect: tuple[str, ...] = Field(default=(), strict=False)
+    """Endpoints at which the tracker listens."""
+
+
+LiveMotion = UdpMotion | TrackerMotion
+MotionTable = Annotated[TraceMotion | CustomMotion | UdpMotion | TrackerMotion, Field(discriminator="source")]
