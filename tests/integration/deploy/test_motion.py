@@ -95,7 +95,7 @@ def test_traced_run_repeats_from_its_folder_alone(tmp_path):
 def test_traced_run_can_be_exported_and_followed_again(tmp_path, suffix):
     overrides = ["duration_s=3", "robots.walkers.motion.start_s=40"]
     first, file = run(TRACED, overrides=overrides, out=tmp_path / "run"), tmp_path / f"walk{suffix}"
-    assert swarmwire("export", tmp_path / "run", "--to", file).returncode == 0
+    assert swarmwire("export", tmp_path / "run", "--kind", "motion", "--to", file).returncode == 0
     shift_m = -200 if suffix != ".csv" else 0
     motion = [f'robots.walkers.motion.file="{file}"', f"robots.walkers.motion.offset_m=[{shift_m}, {shift_m}]"]
     again = run(TRACED, overrides=["duration_s=3", *motion], out=tmp_path / "again")
