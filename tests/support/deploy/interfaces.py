@@ -143,4 +143,6 @@ def running(
 
 def _command(folder: Path, out: Path, options: Sequence[str]) -> list[str]:
     run = [sys.executable, "-m", "swarmwire.deploy", "run", str(folder / "scenario.toml")]
-    return [*run, "--set", "radio.interface={}", "--realtime", "1", "--out", str(out), "--no-rrd", "--quiet", *options]
+    has_interface = "[radio.interface]" in (folder / "scenario.toml").read_text()
+    interface = () if has_interface else ("--set", "radio.interface={}")
+    return [*run, *interface, "--realtime", "1", "--out", str(out), "--no-rrd", "--quiet", *options]

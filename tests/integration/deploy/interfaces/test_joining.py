@@ -22,6 +22,7 @@ from tests.support.deploy.runs import swarmwire
 from tests.support.refusals import refused_input
 
 pytestmark = [needs_interfaces, needs_program("ip", "nsenter", "ping", "unshare")]
+EXAMPLE = Path(__file__).parents[4] / "examples" / "interfaces" / "containers.toml"
 DATAGRAMS, DATA_BYTES, HEADERS_BYTES = 20, 700, 14 + 20 + 8  # Ethernet, IPv4, UDP
 # Sends datagrams to all robots in range.
 BROADCAST = f"""
@@ -110,6 +111,28 @@ def test_commands_and_programs_run_in_a_joined_namespace(tmp_path, places):
         assert reaches(places.named, world.address("line-0"))
         world.end()
     assert swarmwire("verify", world.folder).returncode == 0
+
+
+def test_example_of_containers_reaches_its_ground_station_also_by_ipv6(tmp_path, monkeypatch):
+    with ExitStack() as stack:
+        name, ground = stack.enter_context(named_namespace())
+        drones = [stack.enter_context(process_namespace()) for _ in range(2)]
+        for drone in drones:  # as docker starts containers without an IPv6 network
+            for devices in ("all", "default"):
+                drone.on("sh", "-c", f"echo 1 > /proc/sys/net/ipv6/conf/{devices}/disable_ipv6")
+        pids = {f"px4-{index}": drone.pid for index, drone in enumerate(drones)}
+        monkeypatch.setenv("PATH", container_engine(tmp_path / "bin", pids))
+        options = "--set", f"radio.interface.join.ground-0=netns:{name}"
+        agent = {"standing.py": (EXAMPLE.parent / "standing.py").read_text()}
+        with running(tmp_path, EXAMPLE.read_text(), *options, files=agent) as world:
+            assert [world.address(robot) for robot in world.robots] == ["10.77.0.1", "10.77.0.2", "10.77.0.3"]
+            for drone, to in ((drones[0], "10.77.0.1"), (drones[1], "10.77.0.1"), (drones[0], "fd53:57::3")):
+                assert reaches(drone, to), to
+            assert reaches(ground, "fd53:57::3")
+            assert swarmwire("ctl", "--run", world.folder, "kill", "drone-1").returncode == 0
+            until(lambda: not reaches(ground, "10.77.0.3"))
+            until(lambda: reaches(ground, "10.77.0.2"))
+            world.end()
 
 
 def test_robot_is_off_the_air_once_the_process_that_it_joined_ends_and_others_go_on(tmp_path, places):
