@@ -51,7 +51,7 @@ def places(tmp_path, monkeypatch) -> Generator[Places]:
     with ExitStack() as stack:
         name, named = stack.enter_context(named_namespace())
         process, container = (stack.enter_context(process_namespace()) for _ in range(2))
-        monkeypatch.setenv("PATH", container_engine(tmp_path / "bin", {"px4-3": container.pid}))
+        monkeypatch.setenv("PATH", container_engine(tmp_path / "bin", {"px4-3": container.pid, "stopped": 0}))
         yield Places(name, named, process, container)
 
 
@@ -195,7 +195,10 @@ def refusal(folder: Path, entries: str, entry: str, expected: str) -> None:
 def test_namespaces_that_do_not_exist_are_refused_before_the_run(tmp_path, places):
     refusal(tmp_path, 'line-0 = "netns:none"', "line-0", "expected a network namespace in /run/netns")
     refusal(tmp_path, 'line-1 = "pid:4194305"', "line-1", "expected a running process of this machine")
-    refusal(tmp_path, 'line = "container:px4-{index}"', "line", "expected a running container that docker or podman")
+    known = "expected a running container that docker or podman of this machine knows"
+    unknown = f"{known} (Error: No such container: px4-0; Error: No such container: px4-0); got container:px4-0"
+    refusal(tmp_path, 'line = "container:px4-{index}"', "line", unknown)
+    refusal(tmp_path, 'line-0 = "container:stopped"', "line-0", f"{known} (it does not run; Error: No such")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PATH", str(tmp_path / "none"))
         refusal(tmp_path, 'line-0 = "container:px4-3"', "line-0", "expected docker or podman on PATH")

@@ -142,10 +142,16 @@ def _container_pid(join: Join) -> int:
     engines = [path for engine in ENGINES if (path := shutil.which(engine))]
     if not engines:
         raise join.refused(f"{' or '.join(ENGINES)} on PATH")
+    reasons: list[str] = []
     for engine in engines:
         command = [engine, "inspect", "--type", "container", "--format", "{{.State.Pid}}", "--", join.name]
-        with suppress(OSError, subprocess.SubprocessError, ValueError):  # not this engine's, or its service is off
-            done = subprocess.run(command, capture_output=True, text=True, timeout=ENGINE_TIMEOUT_S, check=True)
-            if (pid := int(done.stdout)) > 0:  # 0: it does not run
-                return pid
-    raise join.refused(GONE["container"])
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=ENGINE_TIMEOUT_S, check=False)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            reasons.append(str(error))
+            continue
+        pid = done.stdout.strip()
+        if pid.isdecimal() and int(pid):
+            return int(pid)
+        reasons.append(done.stderr.strip() or "it does not run")  # then its number is 0
+    raise join.refused(f"{GONE['container']} ({'; '.join(reasons)})")
