@@ -224,6 +224,18 @@ def test_motion_export_can_be_of_a_part_of_the_run(folders, tmp_path):
     assert (t_s.min(), t_s.max()) == (0.1, 0.3)
 
 
+def test_motion_export_has_the_heights_of_a_run_that_recorded_them(folders, tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(folders["argos-rab"], folder)
+    file = folder / "ticks.parquet"
+    ticks = pl.read_parquet(file)
+    height_m = pl.Series("z_m", [[0.25 * robot for robot in range(6)]] * len(ticks), pl.Array(pl.Float32, 6))
+    ticks.with_columns(height_m).write_parquet(file)
+    export(folder, "--to", tmp_path / "a.movements")
+    trace = read_trace(tmp_path / "a.movements")
+    assert trace.z_m.tolist() == np.repeat(0.25 * np.arange(6), len(ticks)).tolist()
+
+
 @pytest.mark.parametrize(
     ("options", "option"),
     [
