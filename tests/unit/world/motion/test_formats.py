@@ -8,7 +8,9 @@ import numpy as np
 import polars as pl
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
+from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.motion.traces.reading import read_trace, write_trace
 from swarmwire.world.motion.traces.trace import MotionTrace, TracePoses
 from tests.support.refusals import refused_input
@@ -268,6 +270,30 @@ def test_faults_of_a_file_are_refused_with_their_line(
 ) -> None:
     with refused_input(tmp_path / name, key, match):
         read(tmp_path, name, text, ORIGIN)
+
+
+TEXTS = {
+    "a.movements": "#3D\n0.0 10.0 20.0 0.0 4.0 30.0 20.0 5.0\n0.0 1.5 2.5 0.0\n",
+    "a.tcl": NS2_SQUARE,
+    "a.eel": EEL,
+    "a.csv": "t_s,robot,x_m,y_m,z_m,heading_rad\n0,a,1,2,3,\n1,a,1,2,3,0.5\n0,b,1,2,3,-0.5\n",
+}
+CHARACTERS = st.text("0123456789.-+e \n\t\"'$#:,;()_XYZabinfst", max_size=6)
+
+
+@pytest.mark.parametrize("name", TEXTS)
+@given(at=st.floats(0.0, 1.0), removed=st.integers(0, 8), inserted=CHARACTERS)
+def test_damaged_file_is_refused_or_gives_finite_poses(
+    tmp_path_factory: pytest.TempPathFactory, name: str, at: float, removed: int, inserted: str
+) -> None:
+    start = int(at * len(TEXTS[name]))
+    text = TEXTS[name][:start] + inserted + TEXTS[name][start + removed :]
+    try:
+        trace = read(tmp_path_factory.mktemp("trace"), name, text, ORIGIN)
+    except BadInput:
+        return
+    followed = TracePoses(trace, range(len(trace.names)), 0.0)
+    assert all(np.isfinite(followed.at(time_s)).all() for time_s in (0.0, 0.5, 3.0, 1e6))
 
 
 def test_infinite_time_in_parquet_is_refused_with_its_row(tmp_path: Path) -> None:
