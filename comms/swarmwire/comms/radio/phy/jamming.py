@@ -100,8 +100,9 @@ def _powers(jammers, position, x, y, z, robots, obstacles, propagation):
                 continue
             over_floor_m, dz = math_compiled.hypot(x[r] - jx, y[r] - jy), z[r] - jz
             distance_m = math.sqrt(over_floor_m * over_floor_m + dz * dz)
-            ends = jx, jy, jz, x[r], y[r], z[r]
-            loss = loss_between_db(mean_loss, waves, obstacles, entered, arena, distance_m, *ends)
+            loss = loss_between_db(
+                mean_loss, waves, obstacles, entered, arena, distance_m, jx, jy, jz, x[r], y[r], z[r]
+            )
             power_mw[j, i] = from_db(jammers.power_dbm[j] + propagation.receive_dbi[r] - loss)
     return power_mw
 

@@ -175,8 +175,9 @@ def _add_walls(loss, x, y, z, robots, obstacles, crossing_db, inside_db_per_m, a
     entered = np.empty((len(obstacles.shape), 2))
     for i in range(len(a)):
         s, r = a[i], b[i]
-        ends = x[s], y[s], z[s], x[r], y[r], z[r]
-        loss[i] += wall_loss_db(obstacles, entered, s // robots, crossing_db, inside_db_per_m, *ends)
+        loss[i] += wall_loss_db(
+            obstacles, entered, s // robots, crossing_db, inside_db_per_m, x[s], y[s], z[s], x[r], y[r], z[r]
+        )
 
 
 @kernel(from_python=True, nogil=True)

@@ -60,12 +60,11 @@ def crossed_and_inside_m(
     """
     if (bz, bx, by) < (az, ax, ay):  # from the lower end; one order of the ends: both directions agree to the last bit
         ax, ay, az, bx, by, bz = bx, by, bz, ax, ay, az
-    dx, dy, dz = bx - ax, by - ay, bz - az
+    dx, dy = bx - ax, by - ay
     length = math.sqrt(dx * dx + dy * dy)  # over the floor
     crossed, inside_m, cells = 0, 0.0, obstacles.cells
     if length == 0.0:
         return crossed, inside_m
-    stretch = math.sqrt(dx * dx + dy * dy + dz * dz) / length  # length in space / over the floor
     dx, dy = dx / length, dy / length
     first, last = columns_to_obstacles(obstacles, arena, ax, ay, bx, by)
     for column in range(first, last + 1):
@@ -80,7 +79,8 @@ def crossed_and_inside_m(
                 below_m = length_below_m(length, az, bz, top_m)
                 chord_m = chord_in_obstacle(ax, ay, dx, dy, below_m, obstacles, k)
                 if chord_m > 0.0:
-                    crossed = _insert(entered, crossed, k, chord_m * stretch)
+                    slope = (bz - az) / length
+                    crossed = _insert(entered, crossed, k, chord_m * math.sqrt(1.0 + slope * slope))
     for i in range(crossed):  # sorted by obstacle, not by cell: the last bit of the sum depends on the order
         inside_m += entered[i, 1]
     return crossed, inside_m
@@ -165,7 +165,7 @@ def bodies_between(bodies: BodyParams, a: IntArray, b: IntArray):
     return counts
 
 
-@njit()
+@kernel()
 def bodies_on_line(bodies: Any, a: int, b: int):
     """Return the number of other robots whose body the line between rows a < b crosses; `bodies_between` for one."""
     x, y, grid, max_radius_m = bodies.x, bodies.y, bodies.grid, bodies.max_radius_m
@@ -182,19 +182,22 @@ def bodies_on_line(bodies: Any, a: int, b: int):
     return count
 
 
-@njit()
+@kernel()
 def _is_body_on_line(bodies: Any, a: Any, b: Any, k: Any):
     """Return True if the body of row k covers a point of the line between rows a and b."""
-    bottom_m, top_m = bodies.z[k], bodies.z[k] + bodies.height_m[k]
-    ax, ay, az, bx, by, bz = bodies.x[a], bodies.y[a], bodies.z[a], bodies.x[b], bodies.y[b], bodies.z[b]
+    ax, ay, bx, by = bodies.x[a], bodies.y[a], bodies.x[b], bodies.y[b]
+    x, y, radius_m = bodies.x[k], bodies.y[k], bodies.radius_m[k]
+    if not is_on_line(ax, ay, bx, by, x, y, radius_m):  # decides most bodies
+        return False
+    az, bz, bottom_m, top_m = bodies.z[a], bodies.z[b], bodies.z[k], bodies.z[k] + bodies.height_m[k]
     if max(az, bz) < bottom_m or min(az, bz) >= top_m:
         return False
     first_x, first_y = _end_between(ax, ay, az, bx, by, bz, bottom_m, top_m)
     last_x, last_y = _end_between(bx, by, bz, ax, ay, az, bottom_m, top_m)
-    return is_on_line(first_x, first_y, last_x, last_y, bodies.x[k], bodies.y[k], bodies.radius_m[k])
+    return is_on_line(first_x, first_y, last_x, last_y, x, y, radius_m)
 
 
-@njit()
+@kernel()
 def _end_between(x: Any, y: Any, z: Any, to_x: Any, to_y: Any, to_z: Any, bottom_m: Any, top_m: Any):
     """Return the end x, y of a line, or the point nearest to it that is between two heights."""
     height_m = min(max(z, bottom_m), top_m)

@@ -36,8 +36,9 @@ def is_out_of_sight(params: Any, pose: AnyArray, sender: int, receiver: int):
         return False
     # From the lower row to the higher, so that both directions of a link agree to the last bit.
     a, b = min(sender, receiver), max(sender, receiver)
-    ends = pose[a, 0], pose[a, 1], pose[a, 3], pose[b, 0], pose[b, 1], pose[b, 3]
-    return is_blocked(params.obstacles, a // params.robots, *ends, params.wrap_m[0], params.wrap_m[1])
+    ax, ay, az, bx, by, bz = pose[a, 0], pose[a, 1], pose[a, 3], pose[b, 0], pose[b, 1], pose[b, 3]
+    wrap_x, wrap_y = params.wrap_m
+    return is_blocked(params.obstacles, a // params.robots, ax, ay, az, bx, by, bz, wrap_x, wrap_y)
 
 
 class LineOfSight(Stage):
