@@ -1,15 +1,16 @@
-"""What it costs that positions are held for a tick: delivery at the edge of range, by speed and rate.
+"""What it costs that positions are held for a tick, or interpolated: delivery at the edge of range, by speed and rate.
 
 `python -m benchmarks.held_positions` prints the Markdown tables of docs/dev/validation.md. A robot drives away from
 another, or towards it, and sends ten packets a second. The same packets, at the same times and with the same draws,
 go over the radio with ticks of 1 ms, and with longer ones: frames see positions at the start of the tick in which
-they go on air. The second table has fading: the attempts at a packet of one tick have the same gain, as long as
-positions are held.
+they go on air, or positions between two ticks. The second table has fading: the attempts at a packet of one tick have
+the same gain, as long as positions are held.
 """
 
 # pyright: basic, reportUnknownMemberType=false
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -34,7 +35,9 @@ RADIOS = {
 }
 FADING = ("ieee802154", ["radio.fading.distribution=rayleigh"])
 FADING_M = 70.0  # where a lone frame has a delivery of 0.8
-SPEEDS_MPS, RATES_HZ, REFERENCE_HZ = (1.0, 3.0, 10.0), (10, 100), 1000
+SPEEDS_MPS, REFERENCE_HZ = (1.0, 3.0, 10.0), 1000
+CASES = (("held", 10), ("interpolated", 10), ("held", 100))  # positions, and ticks per second
+LONGEST_TICK_S = 0.1
 PAIRS, PACKETS, INTERVAL_S, PAYLOAD_BYTES = 3000, 10, 0.1, 20
 NEAR_M = 1.0  # from the edge, to either side
 STEP_M = 0.01  # at which the edge is looked for
@@ -75,7 +78,7 @@ def drives(edge: Edge, speed_mps: float) -> tuple[FloatArray, FloatArray, FloatA
 
 
 def _distance_range(edge: Edge, speed_mps: float) -> tuple[float, float]:
-    margin_m = NEAR_M + 2.0 * speed_mps / min(RATES_HZ)
+    margin_m = NEAR_M + 2.0 * speed_mps * LONGEST_TICK_S
     return edge.near_m - margin_m, edge.far_m + margin_m
 
 
@@ -102,7 +105,7 @@ def received(
 
 
 def rows(name: str, speed_mps: float) -> Iterator[list[str]]:
-    """A row of the table for each rate."""
+    """A row of the table for each case."""
     preset, keys = RADIOS[name]
     radio = radio_of(preset, keys)
     edge = edge_of(radio)
@@ -112,38 +115,39 @@ def rows(name: str, speed_mps: float) -> Iterator[list[str]]:
     counts = (distance_m >= low_m) & (distance_m < high_m)
     is_near = np.abs(distance_m - edge.half_m) <= NEAR_M
     exact = received(radio, start_m, sent_s, speeds_mps, REFERENCE_HZ)
-    for rate_hz in RATES_HZ:
-        held = received(radio, start_m, sent_s, speeds_mps, rate_hz)
-        cells = [name, f"{speed_mps:g}", f"{rate_hz}"]
+    for positions, rate_hz in CASES:
+        got = received(replace(radio, positions=positions), start_m, sent_s, speeds_mps, rate_hz)
+        cells = [name, f"{speed_mps:g}", positions, f"{rate_hz}"]
         for way in (slice(None, PAIRS), slice(PAIRS, None)):
-            more = held[way][counts[way]].sum() - exact[way][counts[way]].sum()
-            near_held, near_exact = (which[way][is_near[way]].mean() for which in (held, exact))
-            cells += [f"{near_exact:.2f}", f"{near_held:.2f}", f"{more / per_m:+.2f}"]
+            more = got[way][counts[way]].sum() - exact[way][counts[way]].sum()
+            near_got, near_exact = (which[way][is_near[way]].mean() for which in (got, exact))
+            cells += [f"{near_exact:.2f}", f"{near_got:.2f}", f"{more / per_m:+.2f}"]
         yield cells
 
 
 def faded(speed_mps: float) -> list[str]:
-    """A row of the second table: delivery of broadcasts and of acknowledged packets at each rate."""
+    """A row of the second table: delivery of broadcasts and of acknowledged packets in each case."""
     radio, cells = radio_of(*FADING), [f"{speed_mps:g}"]
     sent_s = INTERVAL_S * (np.arange(PACKETS) + np.random.default_rng(2).uniform(0.0, 1.0, (PAIRS, PACKETS)))
     drive = np.full(PAIRS, FADING_M), sent_s, np.full(PAIRS, speed_mps)
     for to in (BROADCAST, 1):
-        cells += [f"{received(radio, *drive, rate_hz, to).mean():.2f}" for rate_hz in (*RATES_HZ, REFERENCE_HZ)]
+        for positions, rate_hz in (*CASES, ("held", REFERENCE_HZ)):
+            cells.append(f"{received(replace(radio, positions=positions), *drive, rate_hz, to).mean():.2f}")
     return cells
 
 
 def main() -> None:
     """Print the tables, each row as soon as it is known."""
-    print(
-        "| radio | speed, m/s | `rate_hz` | apart: at 1 kHz | held | range, m | together: at 1 kHz | held | range, m |"
-    )
-    print("| --- " * 9 + "|")
+    print("| radio | speed, m/s | `positions` | `rate_hz` | apart: at 1 kHz | with these | range, m ", end="")
+    print("| together: at 1 kHz | with these | range, m |")
+    print("| --- " * 10 + "|")
     for name in RADIOS:
         for speed_mps in SPEEDS_MPS:
             for cells in rows(name, speed_mps):
                 print("| " + " | ".join(cells) + " |", flush=True)
-    print("\n| speed, m/s | broadcast: 10 Hz | 100 Hz | 1 kHz | acknowledged: 10 Hz | 100 Hz | 1 kHz |")
-    print("| --- " * 7 + "|")
+    cases = " | ".join(f"{positions}, {rate_hz} Hz" for positions, rate_hz in (*CASES, ("held", REFERENCE_HZ)))
+    print(f"\n| speed, m/s | broadcast: {cases} | acknowledged: {cases} |")
+    print("| --- " * 9 + "|")
     for speed_mps in SPEEDS_MPS:
         print("| " + " | ".join(faded(speed_mps)) + " |", flush=True)
 

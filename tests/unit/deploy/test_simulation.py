@@ -179,6 +179,12 @@ def test_without_a_radio_there_is_nothing_between_ticks(tmp_path):
         run(tmp_path / "bare.toml", realtime=1, subtick=0.01)
 
 
+def test_subtick_needs_positions_held():
+    with pytest.raises(BadInput, match='expected "held" with sub-ticks') as refused:
+        run(LOSSY, overrides=["radio.positions=interpolated"], realtime=1, subtick=0.01)
+    assert refused.value.key == "radio.positions"
+
+
 @pytest.mark.usefixtures("_moved")
 def test_realtime_option_sets_the_factor(monkeypatch, capsys, tmp_path):
     command = ("run", "--realtime=20", LOSSY, "--set", "duration_s=0.3", "--out", tmp_path / "run")

@@ -12,6 +12,7 @@ The world's loop calls `step` and then `send` in each tick. What these call, and
     |        PacketTable.accept      phy/packets.py            packets wait for their events
 
     RadioMedium.step                 medium.py                 time passes up to the start of the tick
+    |  poses_between                 positions.py              only if positions are interpolated: ten times
     |  RadioModel.pass_time          model.py                  appends links with fates:
     |  +- unit disk
     |  |     UnitDisk.pass_time      unit_disk/model.py

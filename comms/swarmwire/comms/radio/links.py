@@ -2,9 +2,11 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
+from typing import Any
+
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, IntArray, Table, record_type
+from swarmwire.comms.base.arrays import AnyArray, BoolArray, IntArray, Table, record_type
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio.transmissions import WAITING, Transmissions, grown, keep_packets
@@ -96,3 +98,25 @@ def fill_remainder(link, packet, p, remaining, in_range):
     )
     link.fate = OUT_OF_RANGE if packet.fate == UNDER_WAY else packet.fate
     link.final_at_ns, link.rssi_dbm = packet.off_air_at_ns, np.nan
+
+
+def keep_link_order(packets: Table, links: Table, first: int, rows: int) -> None:
+    """Delay rows of `links` from `first` on so that packets of one link arrive in the order in which they were sent.
+
+    In place. The links of the medium contain all receptions still to come, so no further state is needed. A
+    reception ended by a disruption delays nothing. `rows` is the number of robots of all arenas; rows before `first`
+    have been delayed already, and do not change.
+    """
+    received = np.flatnonzero((links["fate"] == RECEIVED) & (links["receiver"] != NO_ROBOT))
+    link = links["sender"][received].astype(np.int64) * rows + links["receiver"][received]
+    # Sequence numbers of a sender rise in the order of time on air.
+    order = received[np.lexsort((packets["sequence"][links["packet"][received]], link))]
+    _delay(links, order, first)
+
+
+@njit()
+def _delay(links: Any, order: AnyArray, first: int):
+    for i in range(1, len(order)):
+        previous, link = links[order[i - 1]], links[order[i]]
+        if order[i] >= first and link.sender == previous.sender and link.receiver == previous.receiver:
+            link.final_at_ns = max(link.final_at_ns, previous.final_at_ns)

@@ -6,23 +6,22 @@ is final, and counts the fates.
 
 from functools import partial, reduce
 from operator import add
-from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray, Table
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
-from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT
 from swarmwire.comms.radio import results
 from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
 from swarmwire.comms.radio.context import ChannelContext, in_space
 from swarmwire.comms.radio.counters import PacketCounters
 from swarmwire.comms.radio.disruption import Disruption
-from swarmwire.comms.radio.links import RECEIVED, Links
+from swarmwire.comms.radio.links import RECEIVED, Links, keep_link_order
 from swarmwire.comms.radio.liveness import Liveness
 from swarmwire.comms.radio.model import RadioModel
 from swarmwire.comms.radio.phy.model import SinrPhy
+from swarmwire.comms.radio.positions import poses_between
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.send_times import SendTimes
@@ -32,28 +31,6 @@ from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, ReceivedPackets,
 
 # From this number of open links on, `advance` also removes final ones, since it reads all rows.
 MANY_LINKS = 4096
-
-
-def keep_link_order(packets: Table, links: Table, first: int, rows: int) -> None:
-    """Delay rows of `links` from `first` on so that packets of one link arrive in the order in which they were sent.
-
-    In place. The links of the medium contain all receptions still to come, so no further state is needed. A
-    reception ended by a disruption delays nothing. `rows` is the number of robots of all arenas; rows before `first`
-    have been delayed already, and do not change.
-    """
-    received = np.flatnonzero((links["fate"] == RECEIVED) & (links["receiver"] != NO_ROBOT))
-    link = links["sender"][received].astype(np.int64) * rows + links["receiver"][received]
-    # Sequence numbers of a sender rise in the order of time on air.
-    order = received[np.lexsort((packets["sequence"][links["packet"][received]], link))]
-    _delay(links, order, first)
-
-
-@njit()
-def _delay(links: Any, order: AnyArray, first: int):
-    for i in range(1, len(order)):
-        previous, link = links[order[i - 1]], links[order[i]]
-        if order[i] >= first and link.sender == previous.sender and link.receiver == previous.receiver:
-            link.final_at_ns = max(link.final_at_ns, previous.final_at_ns)
 
 
 def _check(context: ChannelContext) -> None:
@@ -74,7 +51,8 @@ class RadioMedium:
 
     A packet waits in its sender's queue, goes on air, and ends at each intended receiver in exactly one fate. Each tick
     is a `step` to its start, then a `send`. So a packet sent in a tick is received in the next tick at the earliest,
-    under the poses of the tick in which it goes on air. `advance` and `send_at` divide a tick into sub-ticks.
+    under the poses of the tick in which it goes on air, or between these and the next ones if the radio's positions are
+    interpolated. `advance` and `send_at` divide a tick into sub-ticks.
 
     A fate becomes final
 
@@ -114,7 +92,8 @@ class RadioMedium:
         self._packets, self._links = Transmissions(), Links()
         self._model: RadioModel = (SinrPhy if radio.is_phy else UnitDisk)(context, self._packets, self._links)
         self._counters = PacketCounters(len(context.keys), context.robots)
-        self._now_ns = 0
+        self._now_ns, self._wrap_m = 0, context.wrap_m
+        self._pose: FloatArray | None = None  # the poses of the last step
         self._parts: list[Results] = []  # results within the current tick
         self._tx_status: list[TxStatuses] = []  # statuses of the current tick that `advance` returned
         self._reported_ns = 0  # `advance` has returned the receptions up to then
@@ -142,8 +121,7 @@ class RadioMedium:
             All results since the last step, those of `advance` included, and the radio graph at `pose`.
         """
         pose = in_space(pose)
-        self._model.expect(pose)
-        self._pass_time(start_ns)
+        self._pass_tick(start_ns, pose)
         liveness = self._liveness
         if disruption is not None:
             liveness.set_pending(disruption)
@@ -159,6 +137,7 @@ class RadioMedium:
             liveness.history.drop_unused(self._model.queued["epoch"])
         final = self._threads.start(partial(self._pop_final, start_ns), len(self._links))
         self._set_poses(pose, radio or self.radio)
+        self._pose = pose
         edges = self._model.edges(pose, liveness.present) if self._computes_graph else results.NO_EDGES
         joined = final()
         if self._parts:
@@ -191,8 +170,10 @@ class RadioMedium:
         """Let time pass within a tick; results do not depend on how often it is called.
 
         Returns the packets received and the transmit statuses since the last call. The next `step` returns them again,
-        with all else that became final.
+        with all else that became final. ValueError if positions are interpolated: the next poses are not known yet.
         """
+        if self.radio.positions == "interpolated":
+            raise ValueError('positions: expected "held" to let time pass before the next poses')
         self._pass_time(until_ns)
         tx_status = self._model.tx_status(self._liveness.present)
         if len(tx_status):
@@ -253,6 +234,15 @@ class RadioMedium:
             raise ValueError(
                 f"to: expected the index of another robot, 0 to {self._robots - 1}, got {sent.to[invalid]}"
             )
+
+    def _pass_tick(self, start_ns: int, pose: FloatArray) -> None:
+        """Let time pass to `start_ns`, with robots at their last poses, or on their way to `pose`."""
+        if self.radio.positions == "interpolated" and self._pose is not None and len(self._model.queued):
+            for part_ns, on_way in poses_between(self._now_ns, self._pose, start_ns, pose, self._wrap_m):
+                self._pass_time(part_ns)
+                self._model.set_poses(on_way)
+        self._model.expect(pose)
+        self._pass_time(start_ns)
 
     def _pass_time(self, until_ns: int) -> None:
         if until_ns < self._now_ns:

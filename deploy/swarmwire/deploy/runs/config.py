@@ -255,6 +255,9 @@ def checked_subtick(subtick: float | None, factor: float | None, scenario: Scena
         subtick = MIN_SUBTICK_S
     if subtick is None:
         return None
+    if scenario.radio and scenario.radio.positions == "interpolated":
+        expected = 'expected "held" with sub-ticks: packets cross before the positions at the end of a tick are known'
+        raise BadInput(scenario.source, "radio.positions", expected)
     if factor is None:
         raise BadInput("subtick", "", "expected realtime with it, or gateways: without them no clock paces the run")
     if scenario.radio is None:

@@ -65,6 +65,7 @@ class Interface:
 
 DATAGRAM_BYTES = 28  # IPv4 and UDP headers
 MIN_MTU_BYTES = 68  # IPv4 (RFC 791)
+POSITIONS = ("held", "interpolated")
 MODELS = ("unit-disk", "log-distance", "friis", "two-ray", "itu-indoor")
 FRAMES = ("plain", "802.11a", "802.11b", "802.11g")
 
@@ -118,6 +119,9 @@ class Radio:
         unit="s",
         above=0,
         at_most=3600,
+    )
+    positions: str = parameter(
+        "held", help="where frames find robots: at the start of the tick, or on their way to its end", choices=POSITIONS
     )
     send_offset: str | float = parameter(
         "uniform",
