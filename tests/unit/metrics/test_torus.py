@@ -26,7 +26,7 @@ def test_distances_between_senders_and_receivers_are_the_shortest():
     at = rng.uniform(-0.5, 0.5, (2, 50, 2)) * SIZE_M
     expected = apart(at[0], at[1])
     x, y = (np.concatenate([at[0, :, axis], at[1, :, axis]])[None] for axis in (0, 1))
-    found = RobotPositions(x, y, np.ones((1, 100), np.bool_), SIZE_M).apart_m(
+    found = RobotPositions(x, y, np.zeros((1, 100)), np.ones((1, 100), np.bool_), SIZE_M).apart_m(
         np.zeros(50, np.int64), *np.arange(100).reshape(2, 50)
     )
     assert found == pytest.approx(expected)

@@ -183,10 +183,10 @@ class Loop:
         actions = self._act(start_ns, readings, packets, tx_status)
         received = results.received if results else ReceivedPackets.none()
         pose, velocity, movable, alive = world.pose, world.velocity, world.movable, world.alive.copy()
-        radio_pose = world.radio_pose if world.static.any_followed else None  # else heights follow from the bodies
+        radio_pose = world.radio_pose
         onsets = world.move(actions)
         command = world.command
-        self._hash.add(pose if radio_pose is None else radio_pose, velocity, command, received)
+        self._hash.add(radio_pose if world.static.any_followed else pose, velocity, command, received)
         self._unseen = None
         events = effects.records
         if self._external_events:
@@ -211,7 +211,7 @@ class Loop:
             departed=results.departed if results else None,
             movable=movable,
             value=world.values.value,
-            height_m=None if radio_pose is None else radio_pose[:, 3],
+            height_m=radio_pose[:, 3],
         )
         for observer in self.observers:
             observer.see(truth)

@@ -150,7 +150,13 @@ class Truth:
     events: tuple[EventRecord, ...] = ()  #: at the tick's start, in order
     departed: TransmissionRecords | None = None  #: None without a radio, and for live observers
     movable: FloatArray | None = None  #: (arenas, movable obstacles, 3) x, y, heading; None: no movable obstacles
-    # (rows,) height in m of each robot's lower side above the floor; None: no source moves robots
+    # (rows,) height in m of each robot's lower side above the floor; None for live observers, and of real robots
     height_m: FloatArray | None = None
     # (rows,) last noted value, NaN: none; None: no agent has noted a value yet, and for live observers
     value: FloatArray | None = None
+
+    @property
+    def position_m(self) -> FloatArray:
+        """x, y and height of each robot, (rows, 3) in m; 0 for a height that is None."""
+        height_m = np.zeros(len(self.pose)) if self.height_m is None else self.height_m
+        return np.column_stack((self.pose[:, :2], height_m))

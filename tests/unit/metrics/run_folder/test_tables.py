@@ -162,6 +162,14 @@ def test_packets_distance_is_that_of_the_tick_when_it_went_on_air(tmp_path, monk
     assert packets(tmp_path)["distance_m"].to_list() == [2.0, 2.0, 3.0]
 
 
+def test_packets_distance_is_that_in_space(tmp_path):
+    of, pose = static(2), np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]])
+    record(
+        tmp_path, of, [truth(of, 0, pose=pose, height_m=np.array([1.0, 13.0]), finished=links(0, 1, 0, 0))], packets=1.0
+    )
+    assert packets(tmp_path)["distance_m"].to_list() == [13.0]  # 3, 4 and 12 m
+
+
 def test_packets_distance_is_null_after_too_long_a_flight(tmp_path, monkeypatch):
     monkeypatch.setattr(packets_table, "POSES_S", 0.2)
     monkeypatch.setattr(packets_table, "CHUNK_ROWS", 1)

@@ -181,6 +181,16 @@ def test_however_short_the_range_the_bins_reach_across_the_arena_and_are_few(ran
     assert 20 <= counts.intended.shape[1] <= 2002
 
 
+def test_distance_counts_are_by_the_distance_in_space():
+    of = replace(static(2), arena_size_m=(40.0, 40.0), range_m=30.0)
+    pose, height_m = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]]), np.array([0.0, 12.0])
+    counts = seen_by(
+        of, {"pose": pose, "height_m": height_m, "departed": departed([0]), "finished": links([0], [1], 0, 0)}
+    )
+    assert np.flatnonzero(counts.intended[0]).tolist() == [int(13.0 / counts.width_m)]
+    assert np.array_equal(counts.intended, counts.received)
+
+
 def test_distance_counts_leave_out_packets_that_never_went_on_air():
     refused = departed([0], fate=Fate.QUEUE_FULL)
     told = {"departed": refused, "finished": links([0], [-1], 0, 0, fate=Fate.QUEUE_FULL, receivers=3)}

@@ -40,11 +40,11 @@ SEQUENCE_MULTIPLIER, SENDER_MULTIPLIER = np.uint64(0x9E3779B97F4A7C15), np.uint6
 class RadioDistances(RecordedTable):
     """A row per bin of the distance between sender and receiver; no table without a radio, or of a killed run.
 
-    Columns: arena, from_m, to_m (centre to centre, when the packet went on air), intended (receivers of packets that
-    went on air: all robots alive then, at any distance, or the addressed robot), received (receivers that received),
-    pdr (received / intended; null without an intended receiver). With more than 70 robots one of n packets is counted;
-    n is `record.radio_distances.every` in the summary. If packets were under way for more than 5 s, counted in
-    `unknown` there, pdr is null.
+    Columns: arena, from_m, to_m (centre to centre in space, when the packet went on air), intended (receivers of
+    packets that went on air: all robots alive then, at any distance, or the addressed robot), received (receivers that
+    received), pdr (received / intended; null without an intended receiver). With more than 70 robots one of n packets
+    is counted; n is `record.radio_distances.every` in the summary. If packets were under way for more than 5 s, counted
+    in `unknown` there, pdr is null.
     """
 
     name = "radio_distances"
@@ -123,8 +123,8 @@ class DistanceCounts(Totals):
         if self._static.range_m is None:  # no radio
             return
         shape = self._static.arenas, self._static.robots
-        x_m, y_m = truth.pose[:, 0].reshape(shape), truth.pose[:, 1].reshape(shape)
-        self._positions[truth.tick] = RobotPositions(x_m, y_m, truth.alive.reshape(shape), self._wrap_m)
+        x_m, y_m, z_m = (column.reshape(shape) for column in truth.position_m.T)
+        self._positions[truth.tick] = RobotPositions(x_m, y_m, z_m, truth.alive.reshape(shape), self._wrap_m)
         self._positions.pop(truth.tick - int(POSES_S * self._static.rate_hz) - 1, None)
         if truth.departed is not None and truth.finished is not None:
             self._add_intended(truth.departed)
@@ -195,6 +195,7 @@ class RobotPositions:
 
     x_m: FloatArray  # (arenas, robots)
     y_m: FloatArray  # (arenas, robots)
+    z_m: FloatArray  # (arenas, robots)
     alive: BoolArray  # (arenas, robots)
     wrap_m: tuple[float, float]  # the sides of a torus, else 0
 
@@ -205,7 +206,8 @@ class RobotPositions:
         if self.wrap_m[0]:
             along_m -= self.wrap_m[0] * np.floor(along_m / self.wrap_m[0] + 0.5)
             across_m -= self.wrap_m[1] * np.floor(across_m / self.wrap_m[1] + 0.5)
-        return np.sqrt(along_m * along_m + across_m * across_m)
+        up_m = self.z_m[arena, b] - self.z_m[arena, a]
+        return np.sqrt(along_m * along_m + across_m * across_m + up_m * up_m)
 
 
 def bin_width_m(range_m: float) -> float:

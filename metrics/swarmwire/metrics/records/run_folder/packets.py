@@ -113,13 +113,13 @@ class PacketRecorder(Observer):
         self._limit = ChunkLimit(CHUNK_ROWS, self._clock)
         self._parts: list[ReceptionRecords] = []
         self._rows, self._first_tick = 0, 0
-        self._poses: list[FloatArray] = []  # poses of the chunk's ticks and of earlier ones
+        self._positions: list[FloatArray] = []  # positions in the chunk's ticks and in earlier ones
 
     def see(self, truth: Truth) -> None:
         """Add the packets whose fate became final by this tick."""
-        if not self._poses:
+        if not self._positions:
             self._first_tick = truth.tick
-        self._poses.append(truth.pose)
+        self._positions.append(truth.position_m)
         if truth.finished is not None and len(truth.finished.sender):
             self._parts.append(truth.finished)
             self._rows += len(truth.finished.sender)
@@ -139,12 +139,12 @@ class PacketRecorder(Observer):
     def _write_chunk(self) -> None:
         if self._parts:
             columns = PacketColumns(
-                self._static, self._sample, self._topics, self._first_tick, list(self._poses), self._parts
+                self._static, self._sample, self._topics, self._first_tick, list(self._positions), self._parts
             )
             self._writer.put(Chunk(self._rows, columns.frame))
         self._parts, self._rows = [], 0
-        old = max(0, len(self._poses) - int(POSES_S * self._static.rate_hz) - 1)
-        del self._poses[:old]
+        old = max(0, len(self._positions) - int(POSES_S * self._static.rate_hz) - 1)
+        del self._positions[:old]
         self._first_tick += old
         self._limit.restart()
 
@@ -167,13 +167,13 @@ class PacketSample:
 
 @dataclass
 class PacketColumns:
-    """Links of a chunk of ticks, and the poses of these and earlier ticks, as references."""
+    """Links of a chunk of ticks, and the positions in these and earlier ticks, as references."""
 
     static: Static
     sample: PacketSample
     topics: Mapping[int, str]  # name of a message's class by its tag
-    first_tick: int  # tick of the first item of `poses`
-    poses: list[FloatArray]  # poses of consecutive ticks, (rows, 3) each
+    first_tick: int  # tick of the first item of `positions`
+    positions: list[FloatArray]  # x, y, z in m in consecutive ticks, (rows, 3) each
     parts: list[ReceptionRecords] = field(default_factory=list[ReceptionRecords])
 
     def frame(self) -> pl.DataFrame:
@@ -210,16 +210,18 @@ class PacketColumns:
         return pl.Series(names, dtype=pl.String).gather(index)
 
     def _distance_m(self, links: Mapping[str, IntArray]) -> FloatArray:
-        """Return the distances when the packets went on air, (k,); NaN without a receiver or the tick's poses."""
+        """Return the distances when the packets went on air, (k,); NaN without a receiver or the tick's positions."""
         tick = geometry_tick(links["on_air_at_ns"], self.static.rate_hz) - self.first_tick
-        rows = np.flatnonzero((links["receiver"] != NO_ROBOT) & (tick >= 0) & (tick < len(self.poses)))
+        rows = np.flatnonzero((links["receiver"] != NO_ROBOT) & (tick >= 0) & (tick < len(self.positions)))
         distance_m = np.full(len(tick), np.nan)
         if len(rows):
-            position = np.stack([pose[:, :2] for pose in self.poses])
+            position = np.stack(self.positions)
             first = links["arena"][rows] * self.static.robots
             sender = position[tick[rows], first + links["sender"][rows]]
             receiver = position[tick[rows], first + links["receiver"][rows]]
-            distance_m[rows] = np.hypot(*shortest_displacement(sender - receiver, self.static).T)
+            away = sender - receiver
+            flat_m = np.hypot(*shortest_displacement(away[:, :2], self.static).T)
+            distance_m[rows] = np.hypot(flat_m, away[:, 2])
         return distance_m
 
 

@@ -185,7 +185,7 @@ class TickColumns:
         self._pose[slot] = truth.pose.reshape(*shape, -1)
         self._velocity[slot] = truth.velocity.reshape(*shape, -1)
         self._command[slot] = truth.command.reshape(*shape, -1)
-        if truth.height_m is not None:
+        if self._static.any_followed and truth.height_m is not None:
             self._height_m[slot] = truth.height_m.reshape(shape)
         if truth.movable is not None:
             self._movable[slot] = truth.movable
