@@ -77,11 +77,14 @@ class KinematicEngine:
     def tick(self, target: FloatArray) -> IntArray:
         """Move by one tick at targets (arenas, n, 3), and count the contacts that began, (arenas, 2)."""
         bodies = self._bodies
+        if self._end is not None and len(self._followed) == target.shape[1]:  # nothing else moves, no contact counts
+            _set_followed(bodies, self._followed, self._end, self._tick_s)
+            return np.zeros((len(target), 2), np.int64)
         path_m = self._tick_s * float(portable.hypot(target[:, :, 0], target[:, :, 2]).max())
         correction = self._corrections.within(float(bodies.discs.radius_m.max()) + path_m)
         _move(correction, bodies, target, self._tick_s)
         if self._end is not None:
-            self._set_followed(self._end)
+            _set_followed(bodies, self._followed, self._end, self._tick_s)
         overlapping = overlaps(bodies.state, bodies.discs, bodies.pushed, bodies.running, correction, self._cells)
         if len(self._followed):
             first, second = overlapping // len(self._fixed) % len(self._fixed), overlapping % len(self._fixed)
@@ -96,17 +99,6 @@ class KinematicEngine:
         """Set the states of the followed robots at the end of the next tick, (arenas, k, 6)."""
         self._end = end
 
-    def _set_followed(self, end: FloatArray) -> None:
-        """Set the followed robots of running arenas to their states, and add the way to the travel of their wheels."""
-        bodies = self._bodies
-        selected = np.ix_(np.flatnonzero(bodies.running), self._followed)
-        end = end[bodies.running]
-        middle = end[:, :, 2] - 0.5 * self._tick_s * end[:, :, 5]
-        rolled = self._tick_s * (end[:, :, 3] * portable.cos(middle) + end[:, :, 4] * portable.sin(middle))
-        turned = 0.5 * self._tick_s * end[:, :, 5] * bodies.wheel_base_m[self._followed]
-        bodies.travel_m[selected] += np.stack((rolled - turned, rolled + turned), axis=2)
-        bodies.state[selected], bodies.pushed[selected] = end, False
-
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Raise TypeError: this engine has no forces. Validation refuses scenarios with impulses for it."""
         raise TypeError("the kinematic engine knows no forces")
@@ -114,6 +106,22 @@ class KinematicEngine:
     def leave(self, over: BoolArray) -> None:
         """Stop the arenas `over` (arenas,): nothing in them moves or touches."""
         self._bodies.running[:] &= ~over
+
+
+@kernel(from_python=True)
+def _set_followed(bodies, followed, end, tick_s):
+    """Set followed robots of running arenas to the states `end`, and add the way to the travel of their wheels."""
+    for arena in range(len(end)):
+        for k in range(len(followed) if bodies.running[arena] else 0):
+            i, then = followed[k], end[arena, k]
+            middle = then[2] - 0.5 * tick_s * then[5]
+            rolled = tick_s * (then[3] * math_compiled.cos(middle) + then[4] * math_compiled.sin(middle))
+            turned = 0.5 * tick_s * then[5] * bodies.wheel_base_m[i]
+            bodies.travel_m[arena, i, 0] += rolled - turned
+            bodies.travel_m[arena, i, 1] += rolled + turned
+            bodies.pushed[arena, i] = False
+            for column in range(6):
+                bodies.state[arena, i, column] = then[column]
 
 
 @kernel(from_python=True)

@@ -1,14 +1,19 @@
-"""Robots that a source moves: where they are at the end of each tick."""
+"""Robots that a source moves: where they are at the end of each tick. Compiled."""
+
+# pyright: basic, reportUnknownMemberType=false
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from swarmwire.comms.base.angles import wrap_angles
+from swarmwire.comms.base.angles import wrap_angle
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.world.motion.source import PoseSource
+
+_wrap_angle = njit()(wrap_angle)
 
 
 class FollowedRobots:
@@ -56,7 +61,7 @@ class FollowedRobots:
             poses: new poses of robots with a live source, in slots x, y, z, heading.
         """
         self._ticks += 1
-        now, had_pose = state[:, self.index], self._has_pose.copy()
+        had_pose = self._has_pose.copy()
         if len(poses):
             robot = poses.rows % len(self.mask)
             poses = poses.select(np.flatnonzero(self._is_live[robot]))
@@ -64,13 +69,7 @@ class FollowedRobots:
             self._pose[column, poses.slot] = poses.value
             self._has_pose[column] = True
         self._read(self._ticks / self._rate_hz)
-        end = now.copy()
-        end[:, :, 3:] = 0.0
-        moved, speeds = self._has_pose, had_pose & self._has_pose
-        end[:, moved, :2] = self._pose[moved, :2]
-        end[:, moved, 2] += wrap_angles(self._pose[moved, 3] - now[:, moved, 2])
-        end[:, speeds, 3:] = (end[:, speeds, :3] - now[:, speeds, :3]) * self._rate_hz
-        return end
+        return _end_states(state, self.index, self._pose, had_pose, self._has_pose, float(self._rate_hz))
 
     def start_poses(self) -> dict[str, FloatArray]:
         """Return x, y in m and heading in rad at the start, (count, 3), of each group with a source in lockstep."""
@@ -85,3 +84,20 @@ class FollowedRobots:
             if group.name in self._sources:
                 columns = self._columns(group)
                 self._pose[columns], self._has_pose[columns] = self._sources[group.name].at(time_s), True
+
+
+@njit()
+def _end_states(state, index, pose, had_pose, has_pose, rate_hz):
+    """Return the states at the end of a tick, (arenas, k, 6), of the robots `index` (k,) that move to `pose` (k, 4)."""
+    end = np.zeros((len(state), len(index), 6))
+    for arena in range(len(state)):
+        for k in range(len(index)):
+            now, then = state[arena, index[k]], end[arena, k]
+            then[0], then[1], then[2] = now[0], now[1], now[2]
+            if not has_pose[k]:
+                continue
+            then[0], then[1], then[2] = pose[k, 0], pose[k, 1], now[2] + _wrap_angle(pose[k, 3] - now[2])
+            if had_pose[k]:
+                for column in range(3):
+                    then[3 + column] = (then[column] - now[column]) * rate_hz
+    return end
