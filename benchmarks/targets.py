@@ -91,6 +91,9 @@ TARGETS = {
     "interfaces-wifi": most(3, "the same over `wifi-a-6M`"),
     "interfaces-wifi-cpu": most(60, "its CPU"),
     "interfaces-start-50": most(2, "50 robots with an interface and a program each, from the call to the first tick"),
+    "trace-1000": most(3, "reading a trace in Parquet: 1,000 robots, an hour, 10 samples a second"),
+    "trace-1000-share": most(5, "its poses, of a tick over a disk, 9 in range"),
+    "poses-udp-100": most(10, "processor of the world for poses of 100 robots at 50 Hz"),
     "tls-cost": most(
         1.15, "a lockstep tick of 40 e-pucks flocking, a process each, over mutual TLS with access control"
     ),
