@@ -17,11 +17,15 @@ from swarmwire.agent import pose_feed
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
+from swarmwire.comms.protocols.ros2.links import close, open_router
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.deploy import repeat, run
 from swarmwire.metrics.records.run_folder.reader import RunFolder
+from tests.support.comms.protocols.ros2 import independent
+from tests.support.comms.protocols.ros2.type_hashes import rihs01
 from tests.support.deploy.runs import ROOT, swarmwire
+from tests.support.world.gateways import PROPER
 
 TRACED = ROOT / "scenarios" / "traced.toml"
 UDP = ROOT / "examples" / "motion" / "udp.toml"
@@ -156,6 +160,38 @@ def test_tracker_poses_move_robots(tmp_path):
     assert result.poses[0].received > 0
     assert result.radio is not None
     assert result.radio.fates["received"] > 0
+
+
+def test_ros2_poses_decide_who_is_in_range_and_the_run_repeats_without_them(tmp_path):
+    endpoint = f"tcp/127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    path = scenario(tmp_path, "ros2", f'connect = ["{endpoint}"]')
+    router, _ = open_router(endpoint)
+    still = independent.TwistWithCovariance(independent.Twist(), [0.0] * 36)
+
+    def send(k: int) -> None:
+        x_m = 8.0 if k % 50 >= 25 else 3.0  # the range is 5 m
+        for name, x in (("row_0", 0.0), ("row_1", x_m)):
+            pose = independent.Pose(independent.Point(x, 1.0, 0.5), independent.Quaternion(0.0, 0.0, 1.0, 1.0))
+            posed = independent.PoseWithCovariance(pose, [0.0] * 36)
+            message = independent.Odometry(independent.header(0, "odom"), "base_link", posed, still)
+            key = f"0/{name}/odom/nav_msgs::msg::dds_::Odometry_/{rihs01(independent.Odometry)}"
+            router.put(key, message.serialize(), attachment=PROPER)
+
+    try:
+        with sending(send):
+            overrides = ["robots.row.motion.max_speed_mps=10000"]
+            result = run(path, overrides=overrides, realtime=1.0, out=tmp_path / "run")
+    finally:
+        close(router)
+    assert result.radio is not None
+    assert result.radio.fates["received"] > 5
+    assert result.radio.fates["out_of_range"] > 5
+    assert result.poses[0].received > 50
+    ticks = RunFolder(tmp_path / "run").ticks()
+    assert set(ticks["x_m"].to_numpy()[-1].tolist()) <= {0.0, 3.0, 8.0}
+    assert ticks["z_m"].to_numpy()[-1] == pytest.approx(0.5)
+    assert ticks["heading_rad"].to_numpy()[-1] == pytest.approx(np.pi / 2)
+    assert repeat(tmp_path / "run").same
 
 
 class Feed:

@@ -8,12 +8,17 @@ from swarmwire.comms.base.clock import Clock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
 from swarmwire.world.motion.live import LiveSource
+from swarmwire.world.motion.ros2 import Ros2Source
 from swarmwire.world.motion.tracker import TrackerSource
 from swarmwire.world.motion.udp import UdpSource
-from swarmwire.world.scenario.motion import TrackerMotion, UdpMotion
+from swarmwire.world.scenario.motion import LiveMotion, Ros2Motion, TrackerMotion, UdpMotion
 from swarmwire.world.scenario.scenario import Scenario
 
-SOURCES: dict[type[UdpMotion | TrackerMotion], type[LiveSource]] = {UdpMotion: UdpSource, TrackerMotion: TrackerSource}
+SOURCES: dict[type[LiveMotion], type[LiveSource]] = {
+    UdpMotion: UdpSource,
+    TrackerMotion: TrackerSource,
+    Ros2Motion: Ros2Source,
+}
 
 
 def check_live_sources(scenario: Scenario, static: Static, *, in_real_time: bool) -> None:
@@ -36,7 +41,7 @@ def open_sources(
         sources: list[LiveSource] = []
         for group in static.groups:
             motion = scenario.robots[group.name].motion
-            if not isinstance(motion, UdpMotion | TrackerMotion):
+            if not isinstance(motion, LiveMotion):
                 continue
             rows, half_m = range(group.start, group.stop), (0.5 * static.arena_size_m[0], 0.5 * static.arena_size_m[1])
             names = static.robot_names[group.start : group.stop]
@@ -52,4 +57,4 @@ def _open(source: LiveSource, key: str, where: str) -> None:
     try:
         source.open()
     except BadInput as error:
-        raise BadInput(where, f"{key}.{error.key}", error.expected) from error
+        raise BadInput(where, f"{key}.{error.key or 'source'}", error.expected) from error

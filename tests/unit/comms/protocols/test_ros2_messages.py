@@ -31,6 +31,8 @@ HASHES = {
     keys.ODOMETRY: "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
     keys.IMU: "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b",
     keys.BATTERY_STATE: "RIHS01_4bee5dfce981c98faa6828b868307a0a73f992ed0789f374ee96c8f840e69741",
+    keys.POSE_STAMPED: "RIHS01_10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8",
+    keys.TRANSFORMS: "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
 }
 LONGEST = 2**63 - 1
 MESSAGES = Messages("jazzy")
@@ -169,7 +171,9 @@ def singles(most: int = 40):
     return st.lists(SINGLES, max_size=most)
 
 
-POSES = st.builds(independent.PoseWithCovariance, st.builds(independent.Pose, vectors(), quaternions()), numbers(36))
+POSE = st.builds(independent.Pose, vectors(), quaternions())
+POSES = st.builds(independent.PoseWithCovariance, POSE, numbers(36))
+TRANSFORM = st.builds(independent.Transform, vectors(), quaternions())
 SAMPLES = {
     keys.TWIST: twists(),
     keys.TWIST_STAMPED: st.builds(independent.TwistStamped, headers(), twists()),
@@ -180,6 +184,11 @@ SAMPLES = {
         FRAMES,
         POSES,
         st.builds(independent.TwistWithCovariance, twists(), numbers(36)),
+    ),
+    keys.POSE_STAMPED: st.builds(independent.PoseStamped, headers(), POSE),
+    keys.TRANSFORMS: st.builds(
+        independent.TFMessage,
+        st.lists(st.builds(independent.TransformStamped, headers(), FRAMES, TRANSFORM), max_size=4),
     ),
     keys.IMU: st.builds(
         independent.Imu, headers(), quaternions(), numbers(9), vectors(), numbers(9), vectors(), numbers(9)

@@ -68,5 +68,33 @@ class TrackerMotion(_LiveMotion):
     """Endpoints at which the tracker listens."""
 
 
-LiveMotion = UdpMotion | TrackerMotion
-MotionTable = Annotated[TraceMotion | CustomMotion | UdpMotion | TrackerMotion, Field(discriminator="source")]
+class Ros2Motion(_LiveMotion):
+    """Poses of ROS 2 topics, over zenoh."""
+
+    source: Literal["ros2"]
+    """Poses of ROS 2 topics, over zenoh."""
+    type: Literal["nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage"] = (
+        "nav_msgs/msg/Odometry"
+    )
+    """Type of the messages."""
+    topic: str | None = Field(default=None, min_length=1)
+    """Name of each robot's topic, with {name}, {index} or {number}; default: by type "/{name}/odom", "/{name}/pose" or
+    "/tf"."""
+    frame: str = Field(default="{name}/base_link", min_length=1)
+    """Each robot's frame in messages of the type TFMessage, with {name}, {index} or {number}."""
+    parent: str = Field(default="map", min_length=1)
+    """Parent of these frames, which is the arena's frame; transforms to other parents are ignored."""
+    transport: Literal["bridge", "rmw"] = "rmw"
+    """The nodes' connection to zenoh: zenoh-bridge-ros2dds or rmw_zenoh."""
+    domain: int = Field(default=0, ge=0, le=232)
+    """ROS_DOMAIN_ID of rmw_zenoh."""
+    distro: Literal["humble", "iron", "jazzy", "kilted", "lyrical"] = "jazzy"
+    """Distribution of ROS 2 of the nodes."""
+    connect: tuple[str, ...] = Field(default=(), strict=False)
+    """Endpoints of routers or bridges; default without `listen`: "tcp/127.0.0.1:7447"."""
+    listen: tuple[str, ...] = Field(default=(), strict=False)
+    """Endpoints at which nodes, routers or bridges connect."""
+
+
+LiveMotion = UdpMotion | TrackerMotion | Ros2Motion
+MotionTable = Annotated[TraceMotion | CustomMotion | LiveMotion, Field(discriminator="source")]

@@ -17,6 +17,7 @@ TWIST = "geometry_msgs/msg/Twist"  # commanded velocities of a base
 TWIST_STAMPED = "geometry_msgs/msg/TwistStamped"  # a Twist with the time of the command
 LASER_SCAN = "sensor_msgs/msg/LaserScan"  # distances on the rays of a scanner
 ODOMETRY = "nav_msgs/msg/Odometry"  # pose of a base, computed from its wheels
+POSE_STAMPED = "geometry_msgs/msg/PoseStamped"  # pose in a frame, with its time
 JOINT_STATE = "sensor_msgs/msg/JointState"  # angles and speeds of wheels
 IMU = "sensor_msgs/msg/Imu"  # acceleration, turn rate, orientation
 BATTERY_STATE = "sensor_msgs/msg/BatteryState"  # voltage and charge

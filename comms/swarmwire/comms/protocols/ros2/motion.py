@@ -31,7 +31,11 @@ Pose = tuple[float, float, float]
 
 
 def yaw_of(quaternion: Any) -> float:
-    """Return the yaw of a quaternion in rad, in [-pi, pi]; nan for a quaternion of length 0."""
+    """Return the yaw of a quaternion of any length in rad, in [-pi, pi]; nan for length 0.
+
+    It is the yaw of roll, pitch and yaw about fixed axes (tf2: impl/utils.hpp, getYaw). Within 0.3 degrees of a pitch
+    of 90 degrees, where tf2 sets the roll to 0, it may differ from tf2's.
+    """
     x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
     if not x * x + y * y + z * z + w * w > 0.0:
         return float("nan")

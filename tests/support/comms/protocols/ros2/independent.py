@@ -62,6 +62,12 @@ class Pose(IdlStruct, typename="geometry_msgs/msg/Pose"):
 
 
 @dataclass
+class PoseStamped(IdlStruct, typename="geometry_msgs/msg/PoseStamped"):
+    header: Header
+    pose: Pose
+
+
+@dataclass
 class PoseWithCovariance(IdlStruct, typename="geometry_msgs/msg/PoseWithCovariance"):
     pose: Pose
     covariance: array[float64, 36]
@@ -231,7 +237,7 @@ class WheelVels(IdlStruct, typename="irobot_create_msgs/msg/WheelVels"):
 
 KINDS = (
     *(Twist, TwistStamped, Odometry, LaserScan, Imu, BatteryState, Illuminance, Clock, TFMessage, Range, JointState),
-    *(HazardDetectionVector, IrIntensityVector, DockStatus, StopStatus, WheelTicks, WheelVels),
+    *(PoseStamped, HazardDetectionVector, IrIntensityVector, DockStatus, StopStatus, WheelTicks, WheelVels),
 )
 BY_KIND = {kind.__idl_typename__: kind for kind in KINDS}
 

@@ -1,0 +1,145 @@
+"""Poses of ROS 2 topics, over rmw_zenoh or zenoh-bridge-ros2dds: Odometry, PoseStamped, or transforms."""
+
+from functools import partial
+from threading import Event, Thread
+from typing import Any
+
+import zenoh
+
+from swarmwire.comms.base.errors import BadFrame, BadInput
+from swarmwire.comms.protocols.ros2.keys import (
+    ODOMETRY,
+    POSE_STAMPED,
+    READ,
+    TRANSFORMS,
+    RmwNode,
+    absolute,
+    bridge_key,
+    check_name,
+    rmw_key,
+    ros_name,
+)
+from swarmwire.comms.protocols.ros2.links import Subscription, check_endpoint, close, open_client, open_router
+from swarmwire.comms.protocols.ros2.messages import Messages
+from swarmwire.comms.protocols.ros2.poses import ONLY, poses_of, space_pose
+from swarmwire.world.motion.live import LiveSource
+from swarmwire.world.scenario.motion import Ros2Motion
+
+TOPICS = {ODOMETRY: "/{name}/odom", POSE_STAMPED: "/{name}/pose", TRANSFORMS: "/tf"}
+ROUTER = "tcp/127.0.0.1:7447"  # default address of rmw_zenoh's router, of a bridge and of the gateway
+NODE = "swarmwire_poses"
+CONNECT_S = 1.0  # duration of an attempt to connect, which delays the end of a run that still waits
+
+
+class Ros2Source(LiveSource):
+    """Subscribes to the topics of the group's robots at each endpoint; the age of a pose counts from its arrival."""
+
+    motion: Ros2Motion
+
+    def open(self) -> None:
+        """Listen, and begin to connect; BadInput for names or endpoints that cannot be used, or without rosbags."""
+        self._messages = Messages(self.motion.distro)
+        self._name_of = self._names_by_pose()
+        self._sessions: list[zenoh.Session] = []
+        self._tokens: list[Any] = []  # zenoh undeclares a token with its last reference
+        self._is_closed, self._threads = Event(), list[Thread]()
+        connect, listen = self.motion.connect, self.motion.listen
+        if not connect and not listen:
+            connect = (ROUTER,)
+        for key, endpoints in (("connect", connect), ("listen", listen)):
+            for endpoint in endpoints:
+                check_endpoint(endpoint, "motion", key)
+        opened = [self._open_router(endpoint) for endpoint in listen]
+        for endpoint in connect:
+            self._threads.append(Thread(target=self._connect, args=(endpoint,), name="poses", daemon=True))
+            self._threads[-1].start()
+        self.address = f"{next(iter(self._name_of))} at {', '.join((*opened, *connect))}"
+
+    def close(self) -> None:
+        """Leave the network; safe to call more than once."""
+        self._is_closed.set()
+        for thread in self._threads:
+            thread.join()
+        for session in self._sessions:
+            close(session)
+        self._sessions, self._tokens = [], []
+
+    def _names_by_pose(self) -> dict[str, dict[str, str]]:
+        """Return the robot of each pose, by the topic's full name and by the pose's name in its messages."""
+        motion, name_of = self.motion, dict[str, dict[str, str]]()
+        for index, name in enumerate(self.names):
+            topic = absolute("/", _filled(motion.topic or TOPICS[motion.type], name, index))
+            check_name(topic, "motion", "topic")
+            frame = _filled(motion.frame, name, index).removeprefix("/") if motion.type == TRANSFORMS else ONLY
+            if other := name_of.setdefault(topic, {}).get(frame):
+                key = "frame" if motion.type == TRANSFORMS else "topic"
+                expected = "expected {name}, {index} or {number} in it"
+                raise BadInput("motion", key, f"{expected}: {other} and {name} would have the same poses")
+            name_of[topic][frame] = name
+        return name_of
+
+    def _open_router(self, endpoint: str) -> str:
+        """Listen at an endpoint, and return it with the port that the system chose."""
+        try:
+            session, opened = open_router(endpoint)
+        except zenoh.ZError as error:
+            self.close()
+            self.close()
+            reason = f"cannot listen on {endpoint}: {str(error).split(' at ')[0]}"
+            raise BadInput("motion", "listen", reason) from error
+        self._subscribe(session)
+        return opened
+
+    def _connect(self, endpoint: str) -> None:
+        """Try to connect until there is an answer; later zenoh itself connects again."""
+        while not self._is_closed.is_set():
+            try:
+                session = open_client(endpoint, CONNECT_S)
+            except zenoh.ZError:
+                self._is_closed.wait(CONNECT_S)
+            else:
+                self._subscribe(session)
+                return
+
+    def _subscribe(self, session: zenoh.Session) -> None:
+        """Subscribe to all topics, and take part in the graph of rmw_zenoh: some nodes publish for subscribers only."""
+        self._sessions.append(session)
+        motion, is_rmw = self.motion, self.motion.transport == "rmw"
+        node = RmwNode(motion.domain, str(session.zid()), 0, "/", NODE)
+        tokens = [node.token] if is_rmw else []
+        for number, topic in enumerate(self._name_of, start=1):
+            if is_rmw:
+                type_hash = self._messages.hash_of(motion.type)
+                tokens.append(node.topic_token(number, READ, topic, motion.type, type_hash))
+            Subscription(
+                session,
+                rmw_key(motion.domain, topic, motion.type) if is_rmw else bridge_key(topic),
+                attached=is_rmw,
+                on_payload=partial(self._take, self._name_of[topic]),
+                on_fault=lambda _: self.count("poses_malformed"),
+            )
+        self._tokens += [session.liveliness().declare_token(token) for token in tokens]
+
+    def _take(self, name_of: dict[str, str], payload: bytes) -> None:
+        """Take the poses in a message; the network's threads call this."""
+        try:
+            message = self._messages.decode(self.motion.type, payload)
+        except BadFrame:
+            self.count("poses_malformed")
+            return
+        for pose_name, position, orientation in poses_of(self.motion.type, message, self.motion.parent):
+            if name := name_of.get(pose_name):  # other frames are those of wheels, sensors and other robots
+                try:
+                    self.put(name, *space_pose(position, orientation))
+                except BadFrame:
+                    self.count("poses_malformed")
+
+
+def _filled(pattern: str, name: str, index: int) -> str:
+    """Return a name for a robot; `{number}` counts from 1.
+
+    >>> _filled("/{name}/odom", "flock-0", 0), _filled("/robot{number}/odom", "flock-0", 0)
+    ('/flock_0/odom', '/robot1/odom')
+    """
+    filled = pattern.replace("{name}", ros_name(name)).replace("{index}", str(index))
+    return filled.replace("{number}", str(index + 1))
