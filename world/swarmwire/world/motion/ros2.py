@@ -84,7 +84,6 @@ class Ros2Source(LiveSource):
             session, opened = open_router(endpoint)
         except zenoh.ZError as error:
             self.close()
-            self.close()
             reason = f"cannot listen on {endpoint}: {str(error).split(' at ')[0]}"
             raise BadInput("motion", "listen", reason) from error
         self._subscribe(session)
