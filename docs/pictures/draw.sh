@@ -20,6 +20,10 @@ done
 swarmwire radio probe scenarios/warehouse-wifi.toml --at=-6,-3.5 --bytes 64 --to docs/coverage.png
 swarmwire run scenarios/warehouse-wifi.toml --quiet --no-rrd --out "$runs/warehouse"
 swarmwire export "$runs/warehouse" --kind delivery --to docs/delivery.png
+.ci/uv run --no-sync python examples/motion/simulator.py 127.0.0.1:9870 100 &
+swarmwire run examples/motion/udp.toml --realtime 1 --quiet --no-rrd --out "$runs/udp"
+kill $!
+swarmwire export "$runs/udp" --kind delivery --to docs/motion-delivery.png
 .ci/uv run --no-sync python -m docs.pictures.hero
 .ci/uv run --no-sync python -m docs.pictures.tutorial
 .ci/uv run --no-sync python docs/pictures/panel.py
