@@ -114,7 +114,8 @@ class GatewayOptions:
         typer.Option(
             "--gateway",
             help="All robots, or those of GROUP, answer as real ones: as crazyflie, epuck2 or ros2 (swarmwire list "
-            "gateways), at ADDRESS, or where the gateway chooses. Repeatable.",
+            "gateways), at ADDRESS, or where the gateway chooses. With radio-only they are elsewhere, and "
+            "use the run's radio. Repeatable.",
             metavar="[GROUP=]KIND[@ADDRESS]",
             rich_help_panel=GATEWAYS,
         ),

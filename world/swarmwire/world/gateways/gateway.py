@@ -72,7 +72,10 @@ class Gateway(ABC):
 
     @abstractmethod
     def open(self) -> tuple[str, ...]:
-        """Start to answer, and return each robot's address for its driver; BadInput if an address is in use."""
+        """Start to answer, and return each robot's address for its driver; BadInput if an address is in use.
+
+        An empty address means that the robot is elsewhere, and uses this run's radio alone.
+        """
 
     def on_robot(self, address: str) -> str:
         """Return the address for programs on a robot with a separate network that reaches `address`."""

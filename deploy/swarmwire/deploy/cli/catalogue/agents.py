@@ -128,7 +128,7 @@ def _gateway(name: str) -> CatalogueEntry:
         return _missing("gateway", name, fault, GATEWAYS)
     facts = (
         ("in a run", f"swarmwire run --gateway {name}"),
-        ("sensors that it reads", ", ".join(sorted(kind.sensors))),
+        ("sensors that it reads", ", ".join(sorted(kind.sensors)) or "none"),
     )
     return _protocol("gateway", name, kind, facts)
 

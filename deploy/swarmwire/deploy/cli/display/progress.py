@@ -171,4 +171,4 @@ class GatewayAddresses(Observer):
 
 
 def _row(robot: ServedRobot) -> tuple[str, str, str, str]:
-    return robot.name, robot.kind, robot.address, robot.command or "(without a run folder no settings)"
+    return robot.name, robot.kind, robot.address or "elsewhere", robot.command or "(without a run folder no settings)"

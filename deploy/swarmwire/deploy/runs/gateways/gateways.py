@@ -134,7 +134,7 @@ WATCHDOG_STEPS, MAX_WATCHDOG_S = 2, 10.0  # bounds of a robot's watchdog: at lea
 class GatewayRobotSettings:
     """Makes the settings with which robots behind gateways act as they would in the run.
 
-    Their limits are the body's, since emulated robots cannot hurt people.
+    Limits of emulated robots are the body's, since these cannot hurt people.
     """
 
     scenario: Scenario
@@ -147,7 +147,10 @@ class GatewayRobotSettings:
     listen: Mapping[str, str]  # endpoint at which each robot waits for the robots after it, in order
 
     def robot_table(self, row: int, choice: GatewayChoice, address: str) -> dict[str, Any]:
-        """Return the content of `robot.toml` for the robot of this row, which answers at `address`."""
+        """Return the content of `robot.toml` for the robot of this row, which answers at `address`.
+
+        A robot elsewhere, without an address, has neither a driver nor limits in it.
+        """
         group = next(group for group in self.static.groups if group.start <= row < group.stop)
         names, table, drive = self.static.robot_names, self.scenario.robots[group.name], group.body.drive
         if table.body_overrides:
@@ -155,6 +158,11 @@ class GatewayRobotSettings:
             raise BadInput(self.scenario.source, f"robots.{group.name}.body_overrides", expected)
         sheet, radio = sheet_path(table.body, self.scenario.source), self.scenario.radio
         rate_hz = max(1, round(self.static.rate_hz / group.act_every_ticks))
+        emulated = {
+            "max_linear_mps": drive.max_linear_mps,
+            "max_angular_radps": drive.max_angular_radps,
+            "driver": {"name": choice.kind, "address": address, **_shared_options(choice)},
+        }
         return {
             "format": 1,
             "name": names[row],
@@ -165,9 +173,7 @@ class GatewayRobotSettings:
             "body": str(sheet) if sheet else table.body,
             "rate_hz": rate_hz,
             "watchdog_s": min(max(self.scenario.run.watchdog_s, WATCHDOG_STEPS / rate_hz), MAX_WATCHDOG_S),
-            "max_linear_mps": drive.max_linear_mps,
-            "max_angular_radps": drive.max_angular_radps,
-            "driver": {"name": choice.kind, "address": address, **_shared_options(choice)},
+            **(emulated if address else {}),
             "radio": {"kind": "world", "max_payload_bytes": radio.max_payload_bytes} if radio else {"kind": "none"},
             "tracker": True,
             "network": self._network_table(names[row]),

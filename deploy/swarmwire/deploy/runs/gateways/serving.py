@@ -38,7 +38,7 @@ class ServedRobot:
 
     name: str
     kind: str  # kind of its gateway, and of the driver that connects to it
-    address: str  # address in the driver's format
+    address: str  # address in the driver's format; "": the robot is elsewhere
     settings: Mapping[str, Any]  # settings of `swarmwire-agent`, the content of `robot.toml`
     file: Path | None  # file of the settings, with a run folder
 
@@ -47,7 +47,8 @@ class ServedRobot:
         """The shell command that drives the robot; None without a run folder."""
         if self.file is None:
             return None
-        return f"{quote(str(command_path('swarmwire-agent')))} run --config {quote(str(self.file))}"
+        command = f"{quote(str(command_path('swarmwire-agent')))} run --config {quote(str(self.file))}"
+        return command if self.address else f"{command} --driver NAME --address ADDRESS"
 
 
 @dataclass(frozen=True)
@@ -63,11 +64,12 @@ class Served:
     endpoints: tuple[str, ...]  #: endpoints of the robots' network
 
     def robot_addresses(self) -> dict[int, tuple[str, str]]:
-        """Return the gateway's address by robot index: on a robot with a network of its own, and outside."""
+        """Return the gateway's address by index of the robots here: on one with a network of its own, and outside."""
         gateways = ((row, group.gateway) for group in self.groups for row in group.rows.tolist())
         return {
             row: (gateway.on_robot(robot.address), robot.address)
             for (row, gateway), robot in zip(gateways, self.robots, strict=True)
+            if robot.address
         }
 
 
@@ -142,8 +144,9 @@ class RunGateways:
                 self._scenario, static, agents, gateways.swarm, network, endpoints, pace, listen
             )
             robots = [
-                _served_robot(settings.robot_table(row, self._choices[group.name], addresses[row]), group.kind, folder)
+                _served_robot(settings.robot_table(row, choice, addresses[row]), choice.kind, addresses[row], folder)
                 for group in groups
+                for choice in [self._choices[group.name]]
                 for row in group.rows.tolist()
             ]
             yield Served(
@@ -188,9 +191,9 @@ class RunGateways:
         )
 
 
-def _served_robot(settings: dict[str, Any], kind: str, folder: Path | None) -> ServedRobot:
+def _served_robot(settings: dict[str, Any], kind: str, address: str, folder: Path | None) -> ServedRobot:
     file = write_settings(folder, settings) if folder else None
-    return ServedRobot(settings["name"], kind, settings["driver"]["address"], settings, file)
+    return ServedRobot(settings["name"], kind, address, settings, file)
 
 
 GRACE_S = 10.0  # wall time after the start until robots without a command are reported
@@ -226,6 +229,7 @@ class Undriven(Observer):
         self._report(f"{verb} {names}{f': {command}{more}' if command else ''}")
 
     def _undriven(self) -> list[ServedRobot]:
-        """Return the robots that no program has driven; served robots are in the order of their groups."""
+        """Return the robots here that no program has driven; served robots are in the order of their groups."""
         are_driven = [bool(driven) for group in self._served.groups for driven in group.driven]
-        return [robot for robot, is_driven in zip(self._served.robots, are_driven, strict=True) if not is_driven]
+        robots = zip(self._served.robots, are_driven, strict=True)
+        return [robot for robot, is_driven in robots if robot.address and not is_driven]
