@@ -27,6 +27,7 @@ from swarmwire.deploy.runs.record.folder import RunWriter
 from swarmwire.deploy.runs.record.inputs import WITHIN, RecordedBackend
 from swarmwire.deploy.runs.record.provenance import PARTS, module_digests
 from swarmwire.metrics.records.run_folder.layout import DIGEST_BYTES, DIGESTS, INPUTS
+from swarmwire.world.scenario.motion import TraceMotion
 from swarmwire.world.scenario.scenario import same_content
 from swarmwire.world.scenario_file import load_scenario
 from tests.integration.deploy.test_realtime import frames_of, runners_here
@@ -132,6 +133,9 @@ def test_scenario_that_is_shipped_survives_python_and_being_written(tmp_path, sc
     for name, table in robots.items():
         if table.body.endswith(".toml"):
             robots[name] = table.model_copy(update={"body": f"files/{Path(table.body).name}"})
+        if isinstance(table.motion, TraceMotion):
+            motion = table.motion.model_copy(update={"file": f"files/{table.motion.file}"})
+            robots[name] = table.model_copy(update={"motion": motion})
     assert same_content(again, changed.model_copy(update={"robots": robots}))
     assert not same_content(again, as_read)
 

@@ -188,7 +188,8 @@ def test_babeld_routes_between_walkers_of_a_trace_over_several_hops(tmp_path):
         "../interfaces", f"{ROOT}/examples/interfaces"
     )
     with running(tmp_path, scenario) as world:
-        start_m = np.array([line.split()[1:3] for line in (ROOT / "scenarios" / "walk.movements").open()], float)
+        lines = (ROOT / "scenarios" / "walk.movements").read_text().splitlines()
+        start_m = np.array([line.split()[1:3] for line in lines], float)
         away_m = np.hypot(*(start_m[:, None] - start_m).transpose(2, 0, 1))
         _, member = connected_components(away_m < 140.0)
         one = int(np.argmax(np.bincount(member)[member]))
