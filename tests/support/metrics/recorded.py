@@ -78,6 +78,7 @@ def made_up_summary(ticks: int, *, arenas: int = 1, rate_hz: int = 10, **given: 
         "realtime_factor": 2.0,
         "realtime": None,
         "interfaces": None,
+        "poses": [],
         "stop": [],
         "by_arena": [{**end, "counts": {}}] * arenas,
         "trajectory_sha256": [f"{arena:064x}" for arena in range(arenas)],

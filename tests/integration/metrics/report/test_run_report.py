@@ -229,6 +229,24 @@ def test_lateness_of_a_real_time_run_is_reported(tmp_path):
     assert "Lateness" in page(report)
 
 
+def test_gaps_in_poses_from_outside_are_reported_by_robot_the_longest_first(tmp_path):
+    folder = run_folder(tmp_path, static(3), wandering(static(3), 6))
+    summary = json.loads((folder / "summary.json").read_text())
+    source = {
+        "source": "udp 127.0.0.1:9870",
+        "received": 1234,
+        "longest_gap_s": {"flock-0": 0.021, "flock-1": 1.5, "flock-2": 0.25},
+        "silent_ticks": {"flock-1": 5},
+    }
+    pace = {"factor": 1.0, "missed_ticks": 0, "worst_lag_s": 0.0, "subtick_s": None, "tick_jitter": None}
+    told = {**summary, "realtime": {**pace, "delivery": None}, "poses": [source]}
+    (folder / "summary.json").write_text(json.dumps(told))
+    report = run_report(folder)
+    gaps = table(report, "Poses from udp 127.0.0.1:9870: 1,234 were used")
+    assert list(gaps.items()) == [("flock-1", ("1.5", "5")), ("flock-2", ("0.25", "0")), ("flock-0", ("0.021", "0"))]
+    assert "longest gap in s" in page(report)
+
+
 def test_lockstep_run_has_no_section_on_real_time(tmp_path):
     report = run_report(run_folder(tmp_path, static(3), wandering(static(3), 6)))
     assert "Real time" not in [section.title for section in report.sections]

@@ -1,4 +1,4 @@
-"""The sections on the radio (fates of packets, delivery over distance, latencies) and on real time (lateness)."""
+"""The sections on the radio (fates, delivery over distance, latencies) and on real time (lateness, gaps of poses)."""
 
 import shlex
 from typing import Any
@@ -35,6 +35,7 @@ _LOG_RATIO = 30.0  # ratio of the longest to the shortest latency above which th
 _LAST_PERCENT = 99.9  # percentile at the end of the axis, since a single packet may be very late
 _DASHES = ((0, ()), (0, (4, 2)), (0, (1.2, 1.6)))
 COLUMNS = ("receiver", "fate", "sent_at_ns", "final_at_ns")
+_MAX_ROBOTS = 12  # larger tables of robots are folded
 _LATE_CAPTION = (
     "Lateness in wall time: of ticks behind their planned start, of deliveries behind the reception by the radio."
 )
@@ -217,7 +218,10 @@ def _ratio(name: str, ratio: float | None) -> str:
 
 
 def _real_time_parts(run: RunData) -> list[Part]:
-    """Return the lateness of ticks, packets and frames; nothing for a run in lockstep, or without a summary."""
+    """Return the lateness of ticks, packets and frames, and the gaps of poses from outside.
+
+    Nothing for a run in lockstep, or without a summary.
+    """
     pace: dict[str, Any] | None = run.summary and run.summary["realtime"]
     if not run.summary or not pace:
         return []
@@ -230,7 +234,8 @@ def _real_time_parts(run: RunData) -> list[Part]:
     rows = tuple((name, *_delay_cells(delay)) for name, delay in delays.items() if delay)
     columns = ("what", "count", "p50 in ms", "p99 in ms", "worst in ms")
     table = [ReportTable(columns, rows, _LATE_CAPTION)] if rows else []
-    return [_pace(pace, run.summary["ticks"]), *table, *([_frames(frames)] if frames else [])]
+    poses = [_poses(source) for source in run.summary["poses"]]
+    return [_pace(pace, run.summary["ticks"]), *table, *([_frames(frames)] if frames else []), *poses]
 
 
 REAL_TIME = ReportSection("Real time", _real_time_parts)
@@ -251,6 +256,21 @@ def _frames(frames: dict[str, Any]) -> str:
         f"Programs sent {sent} through their robots' interfaces; {delivered} were delivered, one per receiver, "
         f"{late} more than {1e3 * LATE_S:g} ms late."
     )
+
+
+def _poses(source: dict[str, Any]) -> ReportTable:
+    """Return a row per robot of a live source of poses, the longest gap first."""
+    gaps_s: dict[str, float] = source["longest_gap_s"]
+    silent: dict[str, int] = source["silent_ticks"]
+    rows = tuple(
+        (robot, number(gap_s), f"{silent.get(robot, 0):,}")
+        for robot, gap_s in sorted(gaps_s.items(), key=lambda pair: -pair[1])
+    )
+    caption = (
+        f"Poses from {source['source']}: {source['received']:,} were used. The gap is the greatest age of a robot's "
+        "newest pose at a tick, in wall time; silent are ticks at which it was older than `max_age_s`."
+    )
+    return ReportTable(("robot", "longest gap in s", "silent ticks"), rows, caption, folded=len(rows) > _MAX_ROBOTS)
 
 
 def _delay_cells(delay: dict[str, Any]) -> tuple[str, ...]:
