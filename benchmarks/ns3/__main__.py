@@ -30,6 +30,7 @@ from benchmarks.ns3.comparison import (
 from benchmarks.ns3.configurations import SECTIONS, Configuration
 from benchmarks.ns3.simulators import NETWORK, Received, ours, theirs
 from benchmarks.ns3.speed import speed
+from benchmarks.ns3.trace import trace
 from swarmwire.comms.base.atomic import atomic_write
 from swarmwire.comms.base.errors import BadInput
 
@@ -47,7 +48,11 @@ MISSING = (
     "ns-3 is not there: `.ci/sync --group validation` brings its wheel (x86-64 Linux, CPython 3.11 to 3.13); "
     "--recorded does without"
 )
-OTHERS = {"closed-forms": "closed forms and ARGoS's rule", "speed": "simulated over CPU time"}
+OTHERS = {
+    "trace": "nodes that move by a trace",
+    "closed-forms": "closed forms and ARGoS's rule",
+    "speed": "simulated over CPU time",
+}
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -56,18 +61,21 @@ def main(arguments: Sequence[str]) -> int:
     if not options.recorded and find_spec("ns3") is None:
         print(MISSING, file=sys.stderr)
         return 2
-    names: list[str] = options.only or [*SECTIONS, *([] if options.quick or options.recorded else OTHERS)]
+    others = ["trace"] if options.recorded else [] if options.quick else OTHERS
+    names: list[str] = options.only or [*SECTIONS, *others]
     sections = {name: SECTIONS[name]() for name in names if name in SECTIONS}
     if options.quick:
         sections = {name: [_quick(each) for each in configurations] for name, configurations in sections.items()}
     every = [each for configurations in sections.values() for each in configurations]
     figures = recorded() if options.recorded else _run(every, Path(options.cache), options.processes)
     rows = {name: _rows(name, configurations, figures) for name, configurations in sections.items()}
-    if options.record:
+    if options.record and figures:
         write_record(figures)
     tables = {name: table(section_rows) for name, section_rows in rows.items()}
     if not set(SECTIONS) - set(names):
         tables["summary"] = summary(rows)
+    if "trace" in names:
+        tables["trace"] = trace(options.recorded, options.record)
     if "closed-forms" in names:
         tables["closed-forms"] = closed_forms()
     if "speed" in names:
@@ -98,9 +106,9 @@ def _options(arguments: Sequence[str]) -> Namespace:
     parser.add_argument("--record", action="store_true", help="write ns-3's figures as the record that tests use")
     parser.add_argument("--build", type=Path, metavar="DIR", help="speed: also an ns-3 build with include/ and lib/")
     options = parser.parse_args(arguments)
-    is_part = options.only and set(SECTIONS) - set(options.only)
+    is_part = options.only and options.only != ["trace"] and set(SECTIONS) - set(options.only)
     if options.record and (options.recorded or options.quick or is_part):
-        parser.error("--record: expected all sections with ns-3, without --recorded and --quick")
+        parser.error("--record: expected all sections or trace alone with ns-3, without --recorded and --quick")
     return options
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict, dataclass
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -149,12 +150,17 @@ class Configuration:
             return -1
         return (sender + (self.senders if self.layout == "pairs" else 1)) % self.nodes
 
-    def ns3_input(self, seed: int, walk_m: FloatArray | None = None) -> str:
-        """What `network.cc` reads for one of the seeds, counted from 0; `walk_m` (ticks, nodes, 2) are other places."""
+    def ns3_input(self, seed: int, walk_m: FloatArray | Path | None = None) -> str:
+        """What `network.cc` reads for one of the seeds, counted from 0.
+
+        `walk_m` are other places, (ticks, nodes, 2), or a movement file of ns-2.
+        """
         at_ns = self.sent_at_ns()[:, seed]
         xy_m = self.xy_m()[seed][None] if walk_m is None else walk_m
+        positions = [f'"{xy_m}"'] if isinstance(xy_m, Path) else xy_m.ravel().tolist()
+        ticks = 0 if isinstance(xy_m, Path) else len(xy_m)
         head = [self.standard, self.mode, seed + 1, self.nodes, self.payload_bytes, *self.counted, *self.counted_ns]
-        head += [self.counted_ns[1] * 1e-9, len(xy_m), self.interval_s, at_ns.size, *xy_m.ravel()]
+        head += [self.counted_ns[1] * 1e-9, ticks, self.interval_s, at_ns.size, *positions]
         packets = [
             f"{sender} {tick} {self.receiver_of(sender)} {at_ns[tick, sender]}"
             for tick in range(self.ticks)

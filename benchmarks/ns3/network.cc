@@ -1,4 +1,4 @@
-// A network of ns-3 3.44: nodes at given places hand packets to their MAC at given times.
+// A network of ns-3 3.44: nodes at given places, or of a movement file of ns-2, hand packets to their MAC at given times.
 //
 // `simulate` takes and returns text, so that Python calls it inside ns-3's wheel (cppyy compiles this file) and a
 // program linked with another build of ns-3 reads standard input (-DPROGRAM).
@@ -8,6 +8,7 @@
 
 #include <cstring>
 #include <ctime>
+#include <iomanip>
 #include <iostream>
 #include <iterator>
 #include <map>
@@ -41,7 +42,8 @@ struct Run
     uint32_t seed, nodes, payload;
     uint32_t first, last;   // sequence numbers that count, the last one excluded
     int64_t from, until;    // in ns: when they count, too, the end excluded
-    uint32_t ticks;         // of positions
+    uint32_t ticks;         // of positions; 0: those of a movement file
+    std::string trace;      // the movement file
     double endS, tickS;
     std::vector<double> x, y; // in m, of each tick and node
     Packets packets;
@@ -59,6 +61,10 @@ Read(std::istream& in)
     for (size_t i = 0; i < run.x.size(); i++)
     {
         in >> run.x[i] >> run.y[i];
+    }
+    if (run.ticks == 0)
+    {
+        in >> std::quoted(run.trace);
     }
     Packets& all = run.packets;
     all.sender.resize(packets);
@@ -79,6 +85,7 @@ struct Received
     std::vector<uint32_t> count; // by sender x nodes + receiver
     std::vector<int64_t> delay;  // their sum, in ns
     std::vector<int64_t> newest; // sequence number
+    std::vector<uint32_t> log;   // with a movement file: index and receiver of each packet
 
     explicit Received(const Run& of)
         : run(of),
@@ -105,6 +112,10 @@ struct Received
         {
             count[pair]++;
             delay[pair] += now - all.at[index];
+            if (!run.trace.empty())
+            {
+                log.insert(log.end(), {index, receiver});
+            }
         }
     }
 };
@@ -199,7 +210,15 @@ Place(const Run* run, const NodeContainer* nodes, uint32_t tick)
     }
 }
 
-// Seconds of CPU time that the events took, then count and sum of delays in ns for each sender and receiver.
+// The place of a packet's sender when it hands it over.
+void
+Sample(const Run* run, const NodeContainer* nodes, std::vector<Vector>* places, uint32_t index)
+{
+    (*places)[index] = nodes->Get(run->packets.sender[index])->GetObject<MobilityModel>()->GetPosition();
+}
+
+// Seconds of CPU time that the events took, then count and sum of delays in ns for each sender and receiver. With
+// a movement file also the place of the sender of each packet, and index and receiver of each packet that counts.
 std::string
 simulate(const std::string& text)
 {
@@ -210,14 +229,26 @@ simulate(const std::string& text)
     RngSeedManager::ResetNextStreamIndex(); // so that a run is the same, whatever ran before it
     NodeContainer nodes;
     nodes.Create(run.nodes);
-    for (uint32_t i = 0; i < run.nodes; i++)
+    if (run.ticks == 0)
     {
-        nodes.Get(i)->AggregateObject(CreateObject<ConstantPositionMobilityModel>());
+        Ns2MobilityHelper(run.trace).Install(nodes.Begin(), nodes.End());
     }
-    Place(&run, &nodes, 0);
+    else
+    {
+        for (uint32_t i = 0; i < run.nodes; i++)
+        {
+            nodes.Get(i)->AggregateObject(CreateObject<ConstantPositionMobilityModel>());
+        }
+        Place(&run, &nodes, 0);
+    }
     for (uint32_t tick = 1; tick < run.ticks; tick++)
     {
         Simulator::Schedule(Seconds(tick * run.tickS), &Place, &run, &nodes, tick);
+    }
+    std::vector<Vector> places(run.ticks == 0 ? run.packets.at.size() : 0);
+    for (uint32_t i = 0; i < places.size(); i++)
+    {
+        Simulator::Schedule(NanoSeconds(run.packets.at[i]), &Sample, &run, &nodes, &places, i);
     }
     Received received(run);
     std::unique_ptr<LrWpanHelper> lrwpan; // it ends its channel when it goes
@@ -241,6 +272,15 @@ simulate(const std::string& text)
     for (size_t pair = 0; pair < received.count.size(); pair++)
     {
         out << " " << received.count[pair] << " " << received.delay[pair];
+    }
+    out << std::setprecision(15);
+    for (const Vector& place : places)
+    {
+        out << " " << place.x << " " << place.y;
+    }
+    for (uint32_t word : received.log)
+    {
+        out << " " << word;
     }
     return out.str();
 }

@@ -3,18 +3,21 @@
 # pyright: basic, reportUnknownMemberType=false
 
 import os
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
+from itertools import repeat
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from benchmarks.ns3.configurations import Configuration, radio_like_ns3
-from swarmwire.comms.base.arrays import IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
@@ -30,13 +33,34 @@ class Received:
     delay_ns: IntArray
 
 
+class Receptions(NamedTuple):
+    """Packets at receivers that have them, (k,) each; seeds are counted from 0."""
+
+    seed: IntArray
+    sender: IntArray
+    receiver: IntArray
+    sequence: IntArray
+    delay_ns: IntArray
+
+
 def ours(configuration: Configuration) -> Received:
     """The medium, with an arena for each seed."""
+    nodes, seeds = configuration.nodes, configuration.seeds
+    radio = radio_like_ns3(configuration.standard, configuration.rate_mbps)
+    xy_m = configuration.xy_m().reshape(-1, 2)
+    packets, delay_ns = np.zeros(seeds * nodes * nodes, np.int64), np.zeros(seeds * nodes * nodes, np.int64)
+    for done in received(configuration, radio, repeat(xy_m, configuration.ticks + 1)):
+        pair = (done.seed * nodes + done.sender) * nodes + done.receiver
+        packets += np.bincount(pair, minlength=len(packets))
+        np.add.at(delay_ns, pair, done.delay_ns)
+    return Received(packets.reshape(seeds, nodes, nodes), delay_ns.reshape(seeds, nodes, nodes))
+
+
+def received(configuration: Configuration, radio: Radio, walk_m: Iterable[FloatArray]) -> Iterator[Receptions]:
+    """What is received of the packets that count, by tick; `walk_m`: places (seeds x nodes, 2) at each tick's start."""
     nodes, seeds, rate_hz = configuration.nodes, configuration.seeds, configuration.rate_hz
     side_m = 2.0 * max(map(abs, configuration.size_m))
-    radio = radio_like_ns3(configuration.standard, configuration.rate_mbps)
     medium = RadioMedium(ChannelContext.open_space(radio, configuration.keys, nodes, (side_m, side_m)), rate_hz)
-    pose = np.concatenate([configuration.xy_m(), np.zeros((seeds, nodes, 1))], axis=2).reshape(-1, 3)
     senders = np.arange(configuration.senders)
     rows = (nodes * np.arange(seeds)[:, None] + senders).ravel()
     to = np.tile([configuration.receiver_of(sender) for sender in senders.tolist()], seeds)
@@ -45,18 +69,15 @@ def ours(configuration: Configuration) -> Received:
     )
     first, last = configuration.counted
     from_ns, until_ns = configuration.counted_ns
-    packets, delay_ns = np.zeros(seeds * nodes * nodes, np.int64), np.zeros(seeds * nodes * nodes, np.int64)
-    for tick in range(configuration.ticks + 1):
-        at_ns = min(tick_start_ns(tick, rate_hz), until_ns) if tick < configuration.ticks else until_ns
-        done = medium.step(at_ns, pose).finished
+    for tick, xy_m in enumerate(walk_m):
+        at_ns = min(tick_start_ns(tick, rate_hz), until_ns)
+        done = medium.step(at_ns, np.column_stack([xy_m, np.zeros(len(xy_m))])).finished
         counts = (done.fate == Fate.RECEIVED) & (done.sequence >= first) & (done.sequence < last)
         counts &= (done.final_at_ns >= from_ns) & (done.final_at_ns < until_ns)
-        pair = ((done.arena * nodes + done.sender) * nodes + done.receiver)[counts]
-        packets += np.bincount(pair, minlength=len(packets))
-        np.add.at(delay_ns, pair, (done.final_at_ns - done.sent_at_ns)[counts])
+        columns = done.arena, done.sender, done.receiver, done.sequence, done.final_at_ns - done.sent_at_ns
+        yield Receptions(*(column[counts] for column in columns))
         if tick < configuration.ticks:
             medium.send(at_ns, tick, sent)
-    return Received(packets.reshape(seeds, nodes, nodes), delay_ns.reshape(seeds, nodes, nodes))
 
 
 def theirs(configuration: Configuration) -> Received:

@@ -29,6 +29,7 @@ swarmwire export "$runs/udp" --kind delivery --to docs/motion-delivery.png
 .ci/uv run --no-sync python docs/pictures/panel.py
 .ci/uv run --no-sync python -m docs.pictures.radio
 .ci/uv run --no-sync python -m docs.pictures.stages
+.ci/uv run --no-sync python -m docs.pictures.trace
 .ci/uv run --no-sync python -m docs.pictures.runner_states
 .ci/uv run --no-sync python -m docs.pictures.agent_processes
 .ci/uv run --no-sync python -m docs.pictures.parts

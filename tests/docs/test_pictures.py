@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from docs.pictures import epuck2_camera, parts, performance, radio_chain, robots, runner_states, tick_figure
+from docs.pictures import epuck2_camera, parts, performance, radio_chain, robots, runner_states, tick_figure, trace
 from docs.pictures.radio import sheet
 from docs.pictures.radio.__main__ import FIGURES
 
@@ -30,6 +30,7 @@ def test_radio_figures_can_be_drawn(name: str, tmp_path: Path, monkeypatch: pyte
         runner_states.draw,
         runner_states.draw_protocol,
         tick_figure.draw,
+        trace.draw,
     ],
 )
 def test_design_figures_can_be_drawn(draw: Callable[[Path], None], tmp_path: Path):

@@ -31,7 +31,10 @@ from benchmarks.ns3.comparison import (
 )
 from benchmarks.ns3.configurations import SECTIONS, Configuration
 from benchmarks.ns3.simulators import Received, ours, theirs
+from benchmarks.ns3.trace import APART, BY_DISTANCE, NEAR, OVER_TIME, TOGETHER, deliveries, recorded_trace
+from benchmarks.ns3.trace import ours as ours_of_trace
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.radio.config.radio import POSITIONS
 
 RECORD = recorded()
 CONFIGURATIONS = [c for make in SECTIONS.values() for c in make()]
@@ -44,6 +47,23 @@ def test_medium_matches_the_recorded_figures_of_ns3(c: Configuration):
     """The same places and send times, and fixed keys: a row is off limits always or never."""
     row = Row.compare(c, RECORD[c], figures_of(c, ours(c)))
     assert not row.misses or row.reason is not None, row.misses
+
+
+@pytest.mark.parametrize("positions", POSITIONS)
+def test_delivery_of_a_trace_matches_the_recorded_figures_of_ns3(positions: str):
+    ns3, medium = recorded_trace().deliveries, deliveries(ours_of_trace(positions))
+    for name, bins in ((OVER_TIME, 60), (NEAR, 60), (BY_DISTANCE, 10)):
+        assert ns3[name].shape == (bins,)
+        np.testing.assert_allclose(medium[name], ns3[name], atol=LIMITS["delivery"])
+
+
+def test_delivery_at_the_edge_of_a_trace_is_half_a_tick_late_if_positions_are_held():
+    """Pairs there move at 2.4 m/s along their line, on average: in 0.05 s by 0.06 of 2 m."""
+    ns3 = recorded_trace().deliveries
+    held, interpolated = (deliveries(ours_of_trace(positions)) for positions in ("held", "interpolated"))
+    for name, difference in ((APART, 0.06), (TOGETHER, -0.06)):
+        assert held[name] - ns3[name] == pytest.approx(difference, abs=0.01)
+        assert interpolated[name] == pytest.approx(ns3[name], abs=0.005)
 
 
 def test_reasons_belong_to_rows():
@@ -124,6 +144,12 @@ def test_ns3_input_has_the_positions_and_send_times_of_the_medium():
     sent = np.array(words[17:], np.int64).reshape(-1, 4)
     assert sent[:, 3].tolist() == LONE.sent_at_ns()[:, 1, 0].tolist()
     assert set(sent[:, 2].tolist()) == {-1}
+
+
+def test_ns3_input_names_a_movement_file():
+    words = LONE.ns3_input(1, Path("my walk.tcl"))
+    assert words.startswith(" ".join(LONE.ns3_input(1).split()[:10]) + " 0 0.01 ")
+    assert words.split('"')[1] == "my walk.tcl"
 
 
 def test_figures_count_packets_in_the_measured_time_by_sender():
