@@ -72,9 +72,12 @@ class TracePoses:
         self._start_s = start_s
         columns = trace.t_s, trace.x_m, trace.y_m, trace.z_m, trace.heading_rad
         robots = [slice(trace.first[robot], trace.first[robot + 1]) for robot in order]
-        # A sample's numbers are neighbours in memory: with an array of each, most accesses would miss the caches.
-        self._samples = np.concatenate([np.column_stack([column[part] for column in columns]) for part in robots])
         self._first = np.cumsum([0, *(part.stop - part.start for part in robots)], dtype=np.int64)
+        # A sample's numbers are neighbours in memory: with an array of each, most accesses would miss the caches.
+        self._samples = np.empty((self._first[-1], len(columns)))
+        for start, part in zip(self._first[:-1], robots, strict=True):
+            for k, column in enumerate(columns):
+                self._samples[start : start + part.stop - part.start, k] = column[part]
         self._cursor = self._first[:-1] - 1  # each robot's last sample up to now; at the start, before its first one
         self._direction_rad = np.zeros(len(robots))  # of each robot's last motion up to now
 
