@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.protocols.ros2.keys import ODOMETRY, POSE_STAMPED, TRANSFORMS
-from swarmwire.comms.protocols.ros2.messages import Messages
+from swarmwire.comms.protocols.ros2.messages import Messages, stamp_ns
 from swarmwire.comms.protocols.ros2.poses import poses_of, space_pose
 from tests.support.comms.protocols.ros2 import independent
 
@@ -51,17 +51,17 @@ def test_pose_that_is_not_finite_is_malformed(axis, value):
         space_pose(independent.Point(*values[:3]), independent.Quaternion(*values[3:]))
 
 
-def test_poses_of_a_tf_message_are_those_below_the_parent_by_frame():
+def test_poses_of_a_tf_message_are_named_by_parent_and_frame():
     def stamped(parent: str, frame: str, x_m: float) -> independent.TransformStamped:
         transform = independent.Transform(independent.Vector3(x_m, 0.0, 0.5), LEVEL)
         return independent.TransformStamped(independent.header(5, parent), frame, transform)
 
     transforms = [stamped("map", "a", 1.0), stamped("odom", "b", 2.0), stamped("/map", "/c", 3.0)]
     message = MESSAGES.decode(TRANSFORMS, independent.TFMessage(transforms).serialize())
-    found = {name: space_pose(*pose) for name, *pose in poses_of(TRANSFORMS, message, "map")}
-    assert {name: (pose.x_m, pose.z_m) for name, pose in found.items()} == {"a": (1.0, 0.5), "c": (3.0, 0.5)}
-    assert found["a"].heading_rad == pytest.approx(0.5)
-    assert [name for name, *_ in poses_of(TRANSFORMS, message, "/odom")] == ["b"]
+    found = {pose.name: space_pose(pose.position, pose.orientation) for pose in poses_of(TRANSFORMS, message)}
+    assert found["map a"] == pytest.approx((1.0, 0.0, 0.5, 0.5))
+    assert {name: pose.x_m for name, pose in found.items()} == {"map a": 1.0, "odom b": 2.0, "map c": 3.0}
+    assert {stamp_ns(pose.header) for pose in poses_of(TRANSFORMS, message)} == {5}
 
 
 def test_poses_of_odometry_and_pose_stamped_are_one_each():
@@ -73,9 +73,9 @@ def test_poses_of_odometry_and_pose_stamped_are_one_each():
         POSE_STAMPED: independent.PoseStamped(independent.header(5, "map"), pose),
     }
     for kind, message in sent.items():
-        [(name, *found)] = poses_of(kind, MESSAGES.decode(kind, message.serialize()), "map")
-        assert name == ""
-        assert space_pose(*found) == pytest.approx((1.0, 2.0, 3.0, 0.5))
+        [found] = poses_of(kind, MESSAGES.decode(kind, message.serialize()))
+        assert (found.name, stamp_ns(found.header)) == ("", 5)
+        assert space_pose(found.position, found.orientation) == pytest.approx((1.0, 2.0, 3.0, 0.5))
 
 
 def test_frame_whose_name_is_no_text_is_malformed():

@@ -21,7 +21,7 @@ from swarmwire.comms.protocols.ros2.keys import (
 )
 from swarmwire.comms.protocols.ros2.links import Subscription, check_endpoint, close, open_client, open_router
 from swarmwire.comms.protocols.ros2.messages import Messages
-from swarmwire.comms.protocols.ros2.poses import ONLY, poses_of, space_pose
+from swarmwire.comms.protocols.ros2.poses import ONLY, poses_of, space_pose, transform_name
 from swarmwire.world.motion.live import LiveSource
 from swarmwire.world.scenario.motion import Ros2Motion
 
@@ -70,12 +70,14 @@ class Ros2Source(LiveSource):
         for index, name in enumerate(self.names):
             topic = absolute("/", _filled(motion.topic or TOPICS[motion.type], name, index))
             check_name(topic, "motion", "topic")
-            frame = _filled(motion.frame, name, index).removeprefix("/") if motion.type == TRANSFORMS else ONLY
-            if other := name_of.setdefault(topic, {}).get(frame):
-                key = "frame" if motion.type == TRANSFORMS else "topic"
+            is_frame, pose_name = motion.type == TRANSFORMS, ONLY
+            if is_frame:
+                pose_name = transform_name(motion.parent, _filled(motion.frame, name, index))
+            if other := name_of.setdefault(topic, {}).get(pose_name):
+                key = "frame" if is_frame else "topic"
                 expected = "expected {name}, {index} or {number} in it"
                 raise BadInput("motion", key, f"{expected}: {other} and {name} would have the same poses")
-            name_of[topic][frame] = name
+            name_of[topic][pose_name] = name
         return name_of
 
     def _open_router(self, endpoint: str) -> str:
@@ -126,10 +128,10 @@ class Ros2Source(LiveSource):
         except BadFrame:
             self.count("poses_malformed")
             return
-        for pose_name, position, orientation in poses_of(self.motion.type, message, self.motion.parent):
-            if name := name_of.get(pose_name):  # other frames are those of wheels, sensors and other robots
+        for part in poses_of(self.motion.type, message):
+            if name := name_of.get(part.name):  # other transforms are those of wheels, sensors and other robots
                 try:
-                    self.put(name, *space_pose(position, orientation))
+                    self.put(name, *space_pose(part.position, part.orientation))
                 except BadFrame:
                     self.count("poses_malformed")
 

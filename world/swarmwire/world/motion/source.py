@@ -108,9 +108,9 @@ def _order(trace: MotionTrace, robots: Sequence[str], count: int, where: str, ke
         if robot not in trace.names:
             raise BadInput(where, f"{key}.robots", f"expected robots of the file: {did_you_mean(trace.names, robot)}")
     if len(names) != count:
-        hint = (
-            "name those of this group in `robots`" if len(names) > count else f"lower robots.{key.split('.')[1]}.count"
-        )
+        shown = f"{', '.join(trace.names[:3])}{', …' if len(trace.names) > 3 else ''}"
+        in_robots = f"name those of this group in `robots`, out of {shown}"
+        hint = in_robots if len(names) > count else f"lower robots.{key.split('.')[1]}.count"
         raise BadInput(where, key, f"expected a trace of {count} robots, got one of {len(names)}: {hint}")
     return [trace.names.index(robot) for robot in names]
 

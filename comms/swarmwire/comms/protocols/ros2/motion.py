@@ -4,7 +4,7 @@
 poses of a real base.
 """
 
-from math import atan2, cos, hypot, isfinite, isnan, nan, radians, sin
+from math import cos, hypot, isfinite, isnan, nan, radians, sin
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from swarmwire.comms.base.angles import wrap_angle
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.base.errors import BadFrame
+from swarmwire.comms.base.math import atan2
 from swarmwire.comms.protocols.ros2.covariance import WheelCovariance, variance_of
 from swarmwire.comms.protocols.ros2.keys import IMU, JOINT_STATE, ODOMETRY
 from swarmwire.comms.protocols.ros2.messages import Messages, stamp_ns
@@ -36,7 +37,7 @@ def yaw_of(quaternion: Any) -> float:
     It is the yaw of roll, pitch and yaw about fixed axes (tf2: impl/utils.hpp, getYaw). Within 0.3 degrees of a pitch
     of 90 degrees, where tf2 sets the roll to 0, it may differ from tf2's.
     """
-    x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
+    x, y, z, w = (float(part) for part in (quaternion.x, quaternion.y, quaternion.z, quaternion.w))
     if not x * x + y * y + z * z + w * w > 0.0:
         return float("nan")
     return atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)

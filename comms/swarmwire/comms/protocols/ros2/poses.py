@@ -20,20 +20,33 @@ class SpacePose(NamedTuple):
     heading_rad: float  # nan: not given
 
 
-def poses_of(kind: str, message: Any, parent: str) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the name, position and orientation of each pose in a message.
+class FoundPose(NamedTuple):
+    """A pose as a message holds it."""
 
-    A transform counts if its parent frame is `parent`; its name is its own frame. Other messages hold `ONLY` one pose.
-    A first slash of a frame is ignored, as tf2 does (tf2: buffer_core.cpp, setTransform).
+    name: str
+    header: Any
+    position: Any
+    orientation: Any
+
+
+def transform_name(parent: str, frame: str) -> str:
+    """Return the name of a frame's pose in its parent; a first slash is ignored, as in tf2 (buffer_core.cpp).
+
+    >>> transform_name("map", "/robot1/base_link")
+    'map robot1/base_link'
     """
+    return f"{parent.removeprefix('/')} {frame.removeprefix('/')}"
+
+
+def poses_of(kind: str, message: Any) -> Iterator[FoundPose]:
+    """Yield the poses in a message: `ONLY` one, or that of each transform."""
     if kind == TRANSFORMS:
         for stamped in message.transforms:
-            if stamped.header.frame_id.removeprefix("/") == parent.removeprefix("/"):
-                frame, transform = stamped.child_frame_id.removeprefix("/"), stamped.transform
-                yield frame, transform.translation, transform.rotation
+            name, transform = transform_name(stamped.header.frame_id, stamped.child_frame_id), stamped.transform
+            yield FoundPose(name, stamped.header, transform.translation, transform.rotation)
     else:
         pose = message.pose.pose if kind == ODOMETRY else message.pose
-        yield ONLY, pose.position, pose.orientation
+        yield FoundPose(ONLY, message.header, pose.position, pose.orientation)
 
 
 def space_pose(position: Any, orientation: Any) -> SpacePose:

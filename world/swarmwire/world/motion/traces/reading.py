@@ -5,12 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.world.motion.traces import bonnmotion, emane, ns2, table
+from swarmwire.world.motion.traces import bonnmotion, emane, mcap, ns2, table
 from swarmwire.world.motion.traces.emane import Origin
 from swarmwire.world.motion.traces.trace import MotionTrace
 
 EEL = ".eel"
-FORMATS: Mapping[str, Any] = {  # modules with `read` and `write`
+FORMATS: Mapping[str, Any] = {  # modules with `read` and `write`; mcap has no `write`
     ".movements": bonnmotion,
     ".movements.gz": bonnmotion,
     ".tcl": ns2,
@@ -19,6 +19,7 @@ FORMATS: Mapping[str, Any] = {  # modules with `read` and `write`
     EEL: emane,
     ".csv": table,
     ".parquet": table,
+    ".mcap": mcap,
 }
 
 

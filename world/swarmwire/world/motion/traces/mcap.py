@@ -1,0 +1,88 @@
+"""MCAP files of ROS 2, as rosbag2 records them: each topic of Odometry or PoseStamped is a robot, as is each transform.
+
+A robot's name is its topic, `/robot_1/odom`, or a topic of TFMessage, parent and frame, `/tf map robot_1/base_link`.
+Times are those of the stamps, and count from the first one. Topics of other types are ignored.
+"""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.errors import BadFrame, BadInput
+from swarmwire.comms.base.extras import ROS2
+from swarmwire.comms.protocols.ros2.keys import ODOMETRY, POSE_STAMPED, TRANSFORMS
+from swarmwire.comms.protocols.ros2.messages import Messages
+from swarmwire.comms.protocols.ros2.messages import stamp_ns as time_of
+from swarmwire.comms.protocols.ros2.poses import SpacePose, poses_of, space_pose
+from swarmwire.world.motion.traces.lines import MAX_NUMBER, refuse_empty
+from swarmwire.world.motion.traces.trace import MotionTrace
+
+KINDS = (ODOMETRY, POSE_STAMPED, TRANSFORMS)
+DISTRO = "jazzy"  # these types are equal in all distributions
+
+
+class StampedPose(NamedTuple):
+    """A pose of a robot, with the stamp of its message."""
+
+    stamp_ns: int
+    pose: SpacePose
+
+
+def read(path: Path) -> MotionTrace:
+    """Read the robots in the order of their names; BadInput if rosbags is not installed."""
+    ROS2.need(str(path))
+    samples: dict[str, list[StampedPose]] = {}
+    for name, sample in _samples(path):
+        samples.setdefault(name, []).append(sample)
+    if not samples:
+        raise refuse_empty(path)
+    names = sorted(samples, key=_natural)
+    for name in names:
+        samples[name].sort(key=lambda stamped: stamped.stamp_ns)
+        if len(samples[name]) > 1 and samples[name][0].stamp_ns == samples[name][-1].stamp_ns:
+            raise BadInput(str(path), name, "expected messages with stamps, which differ")
+    start_ns = min(robot[0].stamp_ns for robot in samples.values())
+    rows = [sample for name in names for sample in samples[name]]
+    t_s = np.array([sample.stamp_ns - start_ns for sample in rows]) / NS_PER_S
+    x_m, y_m, z_m, heading_rad = np.ascontiguousarray(np.array([sample.pose for sample in rows]).T)
+    first = np.cumsum([0, *(len(samples[name]) for name in names)], dtype=np.int64)
+    return MotionTrace(tuple(names), first, t_s, x_m, y_m, z_m, heading_rad)
+
+
+def _samples(path: Path) -> Iterator[tuple[str, StampedPose]]:
+    """Yield the robots' names and poses in the order of the file."""
+    messages, counts = Messages(DISTRO), dict[str, int]()
+    for topic, kind, payload in _payloads(path):
+        counts[topic] = counts.get(topic, 0) + 1
+        try:
+            for part in poses_of(kind, messages.decode(kind, payload)):
+                pose = space_pose(part.position, part.orientation)
+                if not max(map(abs, pose[:3])) <= MAX_NUMBER:
+                    raise BadFrame("malformed", f"a position beyond {MAX_NUMBER:g} m")
+                yield f"{topic} {part.name}".rstrip(), StampedPose(time_of(part.header), pose)
+        except BadFrame as error:
+            key = f"message {counts[topic]} of {topic}"
+            raise BadInput(str(path), key, f"expected a pose of the type {kind}: {error}") from None
+
+
+def _payloads(path: Path) -> Iterator[tuple[str, str, bytes]]:
+    """Yield topic, type and payload of each message that may hold poses; BadInput for a damaged file."""
+    from rosbags.rosbag2 import Reader
+
+    try:
+        with Reader(path) as reader:
+            if chosen := [connection for connection in reader.connections if connection.msgtype in KINDS]:
+                for connection, _, payload in reader.messages(chosen):
+                    yield connection.topic, connection.msgtype, bytes(payload)
+    except Exception as error:  # noqa: BLE001 - the reader trusts the bytes that it reads: damage may raise anything
+        reason = str(error).partition("\n")[0] or type(error).__name__
+        raise BadInput(str(path), "", f"expected an intact MCAP file of ROS 2: {reason}") from None
+
+
+def _natural(name: str) -> list[Any]:
+    """Return a key that sorts robot_2 before robot_10: texts and numbers take turns."""
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", name)]
