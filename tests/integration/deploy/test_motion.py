@@ -218,6 +218,12 @@ def test_live_poses_need_real_time_and_one_seed(tmp_path, options, key):
     assert error.value.key == f"robots.row.motion.{key}"
 
 
+def test_live_run_whose_poses_do_not_come_is_refused_before_its_first_tick(tmp_path):
+    path = scenario(tmp_path, "udp", 'listen = "127.0.0.1:0", wait_s = 0.2')
+    with pytest.raises(BadInput, match="a pose of each robot within 0.2 s: none yet of row-0, row-1"):
+        run(path, realtime=1.0)
+
+
 @pytest.mark.parametrize("listen", ["nowhere", "127.0.0.1:99999", "192.0.2.1:9870"])
 def test_udp_address_that_cannot_be_used_is_refused(tmp_path, listen):
     with pytest.raises(BadInput) as error:

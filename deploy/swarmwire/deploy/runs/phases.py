@@ -180,7 +180,7 @@ class PreparedRun:
             subtick_ns = to_ns((plan.subtick_s or 0.0) * self.factor)
             acting = InterfacesBackend(cast("TimedBackend", acting), interfaces.ports, subtick_ns)
         if pose_sources:
-            acting = FollowingBackend(acting, pose_sources, self.clock, self.writer.report, self.is_stopped)
+            acting = FollowingBackend(acting, pose_sources)
         acting = self.writer.record_actions(acting, partial(self._has_external_actions, backend, log))
         return Loop(
             self.world,

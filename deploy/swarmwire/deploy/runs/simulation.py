@@ -23,6 +23,7 @@ from swarmwire.deploy.runs.gateways.serving import Served
 from swarmwire.deploy.runs.phases import Run, prepare
 from swarmwire.deploy.runs.result import Outcome, Result, result_of
 from swarmwire.world.backends.runner_reports import RunnerHealth
+from swarmwire.world.motion.live import wait_for_poses
 from swarmwire.world.scenario.scenario import Scenario
 
 OUTSIDE = "a simulation is stepped within its `with` block"
@@ -122,17 +123,19 @@ class Simulation:
         self._observers.append(observer)
 
     def __enter__(self) -> Self:
-        """Start the agents; AgentFailed or RunnerLost if that fails."""
+        """Start the agents, and wait for first poses; AgentFailed, RunnerLost or BadInput if that fails."""
         if self._run is not None:
             raise RuntimeError("a simulation runs once; make another one")
         keep_memory()
+        prepared = self._prepared
         with ExitStack() as stack:
-            stack.push(self._prepared.writer.failed_to_start)
+            stack.push(prepared.writer.failed_to_start)
             stack.enter_context(self._prepared.compiling)
             # Set before observers begin, since they read `served` and `health`.
             run = self._run = self._prepared.open(stack, self._observers, self.stop_conditions)
             with run.observers.begin(self.plan.static, agents_join=self.plan.config.listening is not None):
                 run.backend.start()
+                wait_for_poses(run.pose_sources, prepared.clock, prepared.writer.report, prepared.is_stopped)
             self._resources = stack.pop_all()
         self._start_ns = self._prepared.clock.now_ns()
         return self

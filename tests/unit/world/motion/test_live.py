@@ -9,7 +9,7 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.robot.tick_io import Actions, Readings
-from swarmwire.world.motion.live import FollowingBackend, LiveSource
+from swarmwire.world.motion.live import FollowingBackend, LiveSource, wait_for_poses
 from swarmwire.world.scenario.motion import UdpMotion
 from tests.support.clocks import FakeClock
 
@@ -123,7 +123,7 @@ class StandingAgents:
         return Actions.joined([])
 
 
-def test_following_backend_waits_for_all_poses_and_adds_them_to_the_actions() -> None:
+def test_first_poses_are_waited_for_and_added_to_the_actions() -> None:
     clock = FakeClock()
     source, lines = given(clock), list[str]()
     source.put("a-0", 1.0, 0.0, 0.0, 0.0)
@@ -133,8 +133,8 @@ def test_following_backend_waits_for_all_poses_and_adds_them_to_the_actions() ->
             super().sleep_until(at_ns)
             source.put("a-1", 2.0, 0.0, 0.0, 0.0)
 
-    backend = FollowingBackend(StandingAgents(), [source], PuttingClock(), lines.append, lambda: False)
-    backend.start()
+    wait_for_poses([source], PuttingClock(), lines.append, lambda: False)
+    backend = FollowingBackend(StandingAgents(), [source])
     assert len(lines) == 1
     assert "a-1" in lines[0]
     actions = backend.act(0, {}, ReceivedPackets.none(), NO_TX_STATUSES)
@@ -142,16 +142,16 @@ def test_following_backend_waits_for_all_poses_and_adds_them_to_the_actions() ->
     assert backend.counts() == {"late": 3}
 
 
-def test_following_backend_refuses_a_robot_without_a_pose_in_time() -> None:
+def test_robot_without_a_pose_in_time_is_refused() -> None:
     clock = FakeClock()
     source = given(clock, wait_s=2.0)
     source.put("a-0", 1.0, 0.0, 0.0, 0.0)
     with pytest.raises(BadInput, match="a-1"):
-        FollowingBackend(StandingAgents(), [source], clock, lambda _: None, lambda: False).start()
+        wait_for_poses([source], clock, lambda _: None, lambda: False)
     assert clock.time_ns == pytest.approx(2.0 * NS_PER_S, rel=0.05)
 
 
-def test_following_backend_stops_waiting_as_the_run_ends() -> None:
+def test_first_poses_are_not_waited_for_as_the_run_ends() -> None:
     clock = FakeClock()
-    FollowingBackend(StandingAgents(), [given(clock)], clock, lambda _: None, lambda: True).start()
+    wait_for_poses([given(clock)], clock, lambda _: None, lambda: True)
     assert replace(Actions.joined([])).poses.rows.tolist() == np.empty(0).tolist()

@@ -135,39 +135,35 @@ class LiveSource(ABC):
         return PosesReport(self.address, self._received, gaps_s, silent)
 
 
+def wait_for_poses(
+    sources: Sequence[LiveSource], clock: Clock, report: Callable[[str], None], is_stopped: Callable[[], bool]
+) -> None:
+    """Return when every robot has a pose, or when the run must end; BadInput if a robot has none in time.
+
+    `report` prints what the run waits for.
+    """
+    began_ns, reported = clock.now_ns(), ""
+    while not is_stopped():
+        waiting = [source for source in sources if source.missing()]
+        if not waiting:
+            return
+        now_ns = clock.now_ns()
+        for source in waiting:
+            if now_ns - began_ns > to_ns(source.motion.wait_s):
+                raise _no_pose(source)
+        text = ", ".join(f"{source.address} ({_missing(source)})" for source in waiting)
+        if text != reported:
+            report(f"waits for the first poses from {text}")
+            reported = text
+        clock.sleep_until(now_ns + POLL_NS)
+
+
 class FollowingBackend:
     """A backend in real time that adds the new poses of live sources to the actions of each tick."""
 
-    def __init__(
-        self,
-        backend: AgentBackend | TimedBackend,
-        sources: Sequence[LiveSource],
-        clock: Clock,
-        report: Callable[[str], None],
-        is_stopped: Callable[[], bool],
-    ) -> None:
-        """`report` prints what the run waits for; `is_stopped` is true if the run must end."""
-        self._backend, self._sources, self._clock = backend, sources, clock
-        self._report, self._is_stopped = report, is_stopped
-        self.close = backend.close
-
-    def start(self) -> None:
-        """Start the agents, and return when every robot has a pose; BadInput if one has none in time."""
-        self._backend.start()
-        began_ns, reported = self._clock.now_ns(), ""
-        while not self._is_stopped():
-            waiting = [source for source in self._sources if source.missing()]
-            if not waiting:
-                return
-            now_ns = self._clock.now_ns()
-            for source in waiting:
-                if now_ns - began_ns > to_ns(source.motion.wait_s):
-                    raise _no_pose(source)
-            text = ", ".join(f"{source.address} ({_missing(source)})" for source in waiting)
-            if text != reported:
-                self._report(f"waits for the first poses from {text}")
-                reported = text
-            self._clock.sleep_until(now_ns + POLL_NS)
+    def __init__(self, backend: AgentBackend | TimedBackend, sources: Sequence[LiveSource]) -> None:
+        self._backend, self._sources = backend, sources
+        self.start, self.close = backend.start, backend.close
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
