@@ -33,11 +33,12 @@ ROWS = """
 format = 1
 name = "poses from outside"
 duration_s = 2.0
-time = {{ rate_hz = 20 }}
+time = {{ rate_hz = 40 }}
 arena = {{ size_m = [40.0, 10.0] }}
 [robots.row]
 body = "epuck2"
 count = 2
+act_every_ticks = 2  # in every other tick only poses are recorded
 agent = "swarmwire.agent.behaviours:Consensus"
 motion = {{ source = "{source}", {settings} }}
 [radio]
@@ -120,7 +121,7 @@ def test_udp_poses_decide_who_is_in_range_and_the_run_repeats_without_them(tmp_p
         """Set from the middle of the run on."""
 
         def see(self, truth: Truth) -> None:
-            if truth.tick == 20:
+            if truth.tick == 40:
                 self.set()
 
     away = Away()

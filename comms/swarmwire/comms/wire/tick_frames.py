@@ -32,6 +32,7 @@ from swarmwire.comms.wire.frames import Frame, checked_array
 
 RECEIVED_COLUMNS = ("receiver", "sender_index", "sequence", "received_at_ns", "payload")  # rows of received/numbers
 NO_EXTRA_ARRAYS: Mapping[str, AnyArray] = MappingProxyType({})
+POSES, POSE_SLOTS = "poses", 4  # the table of poses, and its slots: x, y, z, heading
 
 
 def encode_tick(tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses) -> bytes:
@@ -176,18 +177,26 @@ def sent_arrays(sent: SentPackets) -> dict[str, AnyArray]:
     return arrays if sent.tx_status_id is None else arrays | {"sent/tx_status_id": sent.tx_status_id}
 
 
-def decode_actions(frame: Frame, rows: IntArray) -> Actions:
-    """Decode the actions of the robots `rows` (n,); BadFrame if the frame has other rows or contradicts itself."""
+def decode_actions(frame: Frame, rows: IntArray, placed: IntArray | None = None) -> Actions:
+    """Decode the actions of the robots `rows` (n,); BadFrame if the frame has other rows or contradicts itself.
+
+    Only the robots `placed` (m,) may have poses, in a frame that the world recorded itself; agents place no robots.
+    """
     n = len(rows)
+    if POSES in frame.arrays and placed is None:
+        raise BadFrame("malformed", "poses: expected none from agents")
     if checked_array(frame, "rows", "<i8", (n,)).tobytes() != rows.tobytes():
         raise BadFrame("malformed", "rows: expected the runner's own robots")
     drive, linear_mps, angular_radps, lateral_mps = checked_array(frame, "command", "<f8", (4, n))
     sent = sent_of(frame, rows) if "sent" in frame.arrays else SentPackets.none()
-    tables = {name: _table(frame, name, rows) for name in TABLES if name in frame.arrays}
+    owners = {name: placed if name == POSES and placed is not None else rows for name in TABLES}
+    tables = {name: _table(frame, name, owners[name]) for name in TABLES if name in frame.arrays}
     if "notes" in tables:
         tables["notes"] = _named(tables["notes"], frame.values.get("states"))
     _check_integers(tables.get("leds", NOTHING_SET), "leds", BRIGHTEST)
     _check_integers(tables.get("motors", NOTHING_SET), "motors", 1)
+    if (tables.get(POSES, NOTHING_SET).slot >= POSE_SLOTS).any():
+        raise BadFrame("malformed", f"poses: expected slots 0 to {POSE_SLOTS - 1}")
     return Actions(rows, drive != 0.0, linear_mps, angular_radps, lateral_mps, sent, **tables)
 
 

@@ -220,6 +220,26 @@ def refuse(**changes: Any) -> None:
         decode_actions(replace(frame, arrays={**frame.arrays, **changes}), ROWS)
 
 
+PLACED = SparseTable(np.array([2, 2, 7, 7]), np.array([0, 1, 0, 3]), np.array([0.5, -2.0, 1.0, 3.0]))
+
+
+def test_poses_survive_in_a_recorded_frame_also_of_robots_that_did_not_act() -> None:
+    frame = frames.decode(encode_actions(0, sound(poses=PLACED)))
+    got = decode_actions(frame, ROWS, placed=np.arange(10)).poses
+    assert all(equal(getattr(got, name), getattr(PLACED, name)) for name in ("rows", "slot", "value"))
+
+
+@pytest.mark.parametrize(
+    ("table", "placed"),
+    [(PLACED, None), (PLACED, np.arange(7)), (replace(PLACED, slot=np.array([0, 1, 2, 4])), np.arange(10))],
+    ids=["from agents", "of no robot", "in no slot"],
+)
+def test_poses_are_refused_from_agents_of_unknown_robots_and_in_unknown_slots(table: Any, placed: Any) -> None:
+    frame = frames.decode(encode_actions(0, sound(poses=table)))
+    with refused_frame():
+        decode_actions(frame, ROWS, placed)
+
+
 def test_actions_frame_survives_with_sparse_tables_and_omits_empty_ones() -> None:
     done = sound(actuators=ACTUATED, leds=LEDS, motors=MOTORS)
     got = decode_actions(frames.decode(encode_actions(0, done)), ROWS)

@@ -141,7 +141,7 @@ class RecordedInputs:
             rows = frame.arrays["rows"]
             if ((rows < 0) | (rows >= robots)).any():
                 raise BadFrame("malformed", f"rows: expected robots of {robots}")
-            return decode_actions(frame, rows)
+            return decode_actions(frame, rows, placed=np.arange(robots))
         except BadFrame as fault:
             raise self._damaged(tick, fault) from None
 
