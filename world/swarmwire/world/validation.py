@@ -92,7 +92,7 @@ def _check_motion(scenario: Scenario, where: str) -> None:
             expected = "expected walls or open as arena.boundary: a source's poses do not wrap around a torus"
             raise BadInput(where, f"robots.{group}.motion", expected)
         if isinstance(table.motion, TraceMotion):
-            is_geodetic = table.motion.file.endswith(".eel")
+            is_geodetic = table.motion.file.lower().endswith(".eel")
             if is_geodetic != (table.motion.origin is not None):
                 reason = "its positions are latitudes and longitudes" if is_geodetic else "only for .eel"
                 got = "" if is_geodetic else "no "

@@ -1,6 +1,8 @@
 """Robots of a scenario that a source moves."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ CSV = """t_s,robot,x_m,y_m,z_m,heading_rad
 """
 
 
-def mapping(motion: object, count: int = 2, **tables: object) -> dict[str, object]:
+def mapping(motion: object, count: int = 2, **tables: object) -> dict[str, Any]:
     group = {"body": "epuck", "count": count, "agent": "swarmwire.agent.behaviours:Consensus", "motion": motion}
     return {
         "format": 1,
@@ -31,12 +33,12 @@ def mapping(motion: object, count: int = 2, **tables: object) -> dict[str, objec
     }
 
 
-def traced(folder: Path, text: str = CSV, **settings: object) -> dict[str, object]:
+def traced(folder: Path, text: str = CSV, **settings: object) -> dict[str, Any]:
     (folder / "motion.csv").write_text(text)
     return {"source": "trace", "file": str(folder / "motion.csv"), **settings}
 
 
-def world_of(table: dict[str, object], seeds: tuple[int, ...] = (1,)) -> World:
+def world_of(table: dict[str, Any], seeds: tuple[int, ...] = (1,)) -> World:
     return World(scenario_from(table, "test"), seeds, {})
 
 
@@ -82,7 +84,7 @@ def test_commands_to_followed_robots_are_ignored_and_counted(tmp_path: Path) -> 
         ({"offset_m": [4.5, 0.0]}, "robot a"),
     ],
 )
-def test_trace_that_does_not_fit_names_key_or_robot(tmp_path: Path, change: dict[str, object], key: str) -> None:
+def test_trace_that_does_not_fit_names_key_or_robot(tmp_path: Path, change: dict[str, Any], key: str) -> None:
     with pytest.raises(BadInput) as error:
         world_of(mapping({**traced(tmp_path), **change}))
     assert error.value.key == key
@@ -104,7 +106,7 @@ def test_torus_has_no_followed_robots(tmp_path: Path) -> None:
 def test_live_robot_stands_where_it_was_placed_until_its_first_pose() -> None:
     place = {"how": "poses", "poses": [[0.0, 1.0, 0.5], [2.0, 1.0, 0.0]]}
     table = mapping({"source": "udp"})
-    table["robots"]["led"]["place"] = place  # type: ignore[index]
+    table["robots"]["led"]["place"] = place
     world = world_of(table)
     world.move(STILL)
     assert world.pose[:, :2].tolist() == [[0.0, 1.0], [2.0, 1.0]]
@@ -119,6 +121,23 @@ def test_live_robot_stands_where_it_was_placed_until_its_first_pose() -> None:
     world.move(STILL)
     assert world.pose[1] == pytest.approx([-2.9, 2.0, 1.0])
     assert world.velocity[1].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_first_live_pose_without_a_heading_keeps_that_of_the_place() -> None:
+    table = mapping({"source": "udp"})
+    table["robots"]["led"]["place"] = {"how": "poses", "poses": [[0.0, 1.0, 0.5], [2.0, 1.0, -2.0]]}
+    world = world_of(table)
+    new = SparseTable(np.array([1, 1]), np.arange(2), np.array([-3.0, 2.0]))
+    world.move(replace(STILL, poses=new))
+    assert world.pose[1].tolist() == [-3.0, 2.0, -2.0]
+
+
+@pytest.mark.parametrize(("file", "origin"), [("a.EEL", None), ("a.eel", None), ("a.CSV", [0.0, 0.0, 0.0])])
+def test_origin_is_for_emane_alone_and_always_whatever_the_case_of_the_suffix(file: str, origin: object) -> None:
+    settings = {} if origin is None else {"origin": origin}
+    with pytest.raises(BadInput) as error:
+        scenario_from(mapping({"source": "trace", "file": file, **settings}), "test")
+    assert error.value.key == "robots.led.motion.origin"
 
 
 ORBIT = """
@@ -154,5 +173,5 @@ def test_custom_source_moves_robots_and_its_faults_name_the_key(tmp_path: Path) 
 def test_followed_group_beside_robots_that_drive_shares_their_engine(tmp_path: Path) -> None:
     table = mapping(traced(tmp_path))
     assert world_of(table).engines == ("kinematic",)
-    robots = {**table["robots"], "free": {"body": "epuck", "count": 1, "agent": "swarmwire.agent.behaviours:Diffusion"}}  # type: ignore[dict-item]
+    robots = {**table["robots"], "free": {"body": "epuck", "count": 1, "agent": "swarmwire.agent.behaviours:Diffusion"}}
     assert world_of({**table, "robots": robots}).engines == ("discs",)

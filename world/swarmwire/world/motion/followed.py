@@ -11,7 +11,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.tick_io import SparseTable
-from swarmwire.world.motion.source import PoseSource
+from swarmwire.world.motion.source import LockstepSource
 
 _wrap_angle = njit()(wrap_angle)
 
@@ -24,25 +24,24 @@ class FollowedRobots:
     pose until the next one arrives.
 
     Attributes:
-        mask: (robots,) True for the robot indices that a source moves.
-        index: (k,) these robot indices, rising.
+        index: (k,) the robot indices that a source moves, rising.
     """
 
-    def __init__(self, groups: Sequence[Group], sources: Mapping[str, PoseSource], rate_hz: int) -> None:
+    def __init__(self, groups: Sequence[Group], sources: Mapping[str, LockstepSource], rate_hz: int) -> None:
         """`sources` has the source in lockstep of each group; followed groups without one have a live source."""
         self._rate_hz, self._ticks = rate_hz, 0
         self._groups = [group for group in groups if group.followed]
         self._sources = sources
-        self.mask: BoolArray = np.zeros(groups[-1].stop, np.bool_)
+        self._is_followed: BoolArray = np.zeros(groups[-1].stop, np.bool_)
         for group in self._groups:
-            self.mask[group.start : group.stop] = True
-        self.index: IntArray = np.flatnonzero(self.mask)
-        self._column = np.cumsum(self.mask) - 1  # robot index -> column in the arrays (k,)
+            self._is_followed[group.start : group.stop] = True
+        self.index: IntArray = np.flatnonzero(self._is_followed)
+        self._column = np.cumsum(self._is_followed) - 1  # robot index -> column in the arrays (k,)
         self._pose = np.zeros((len(self.index), 4))  # x, y, z in m, heading in rad
         for group in self._groups:
             self._pose[self._columns(group), 2] = group.body.altitude_m
         self._has_pose = np.zeros(len(self.index), np.bool_)  # False: its live source has given no pose yet
-        self._is_live = self.mask.copy()
+        self._is_live = self._is_followed.copy()
         for group in self._groups:
             if group.name in sources:
                 self._is_live[group.start : group.stop] = False
@@ -58,14 +57,14 @@ class FollowedRobots:
 
         Args:
             state: (arenas, robots, 6) the present state of all robots.
-            poses: new poses of robots with a live source, in slots x, y, z, heading.
+            poses: new poses of robots with a live source, in slots x, y, z, heading; only with a single arena.
         """
         self._ticks += 1
         had_pose = self._has_pose.copy()
         if len(poses):
-            robot = poses.rows % len(self.mask)
-            poses = poses.select(np.flatnonzero(self._is_live[robot]))
-            column = self._column[poses.rows % len(self.mask)]
+            self._pose[~had_pose, 3] = state[0, self.index[~had_pose], 2]  # for first poses without a heading
+            poses = poses.select(np.flatnonzero(self._is_live[poses.rows]))
+            column = self._column[poses.rows]
             self._pose[column, poses.slot] = poses.value
             self._has_pose[column] = True
         self._read(self._ticks / self._rate_hz)

@@ -88,17 +88,17 @@ class LiveSource(ABC):
             self._keep(index, x_m, y_m, z_m, heading_rad)
 
     def _keep(self, index: int, x_m: float, y_m: float, z_m: float, heading_rad: float) -> None:
-        now_ns, pose = self._clock.now_ns(), self._pose[index]
+        now_ns, (last_x_m, last_y_m, last_z_m, last_heading_rad) = self._clock.now_ns(), self._pose[index].tolist()
+        z_m = last_z_m if math.isnan(z_m) else z_m
         if self._arrived_ns[index] != NEVER_ARRIVED_NS:
-            away_m = math.hypot(x_m - pose[0], y_m - pose[1])
+            climb_m = 0.0 if math.isnan(last_z_m) else z_m - last_z_m
+            away_m = math.hypot(x_m - last_x_m, y_m - last_y_m, climb_m)
             if away_m > self.motion.max_speed_mps * to_s(now_ns - self._arrived_ns[index]) + POSITION_NOISE_M:
                 self._counted["poses_jumped"] += 1
                 return
-        pose[0], pose[1] = x_m, y_m
-        if not math.isnan(z_m):
-            pose[2] = z_m
-        if not math.isnan(heading_rad):
-            pose[3] = heading_rad
+        heading_rad = last_heading_rad if math.isnan(heading_rad) else heading_rad
+        # One assignment, so that the loop's thread never reads a part of two poses.
+        self._pose[index] = x_m, y_m, z_m, heading_rad
         self._arrived_ns[index], self._is_new[index] = now_ns, True
         self._received += 1
 

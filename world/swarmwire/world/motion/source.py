@@ -33,15 +33,7 @@ class PoseSource(ABC):
         """
 
 
-@dataclass
-class TraceSource(PoseSource):
-    """The poses of a trace."""
-
-    poses: TracePoses
-
-    def at(self, time_s: float) -> FloatArray:
-        """Return the poses at a time of the run."""
-        return self.poses.at(time_s)
+LockstepSource = PoseSource | TracePoses
 
 
 @dataclass
@@ -57,19 +49,19 @@ class CheckedSource(PoseSource):
         """Return the poses at a time of the run; BadInput unless they have the right shape and are finite."""
         pose = np.asarray(self.source.at(time_s), np.float64)
         if pose.shape != (self.count, 4) or not np.isfinite(pose).all():
-            got = f"got an array of {pose.shape}" if pose.shape != (self.count, 4) else "got numbers that are not"
+            got = f"got an array of {pose.shape}" if pose.shape != (self.count, 4) else "got NaN or infinite numbers"
             name = type(self.source).__name__
             expected = f"expected finite poses ({self.count}, 4) of {name}.at({time_s:g}), {got}"
             raise BadInput(self.where, self.key, expected)
         return pose
 
 
-def lockstep_sources(scenario: Scenario, size_m: tuple[float, float]) -> dict[str, PoseSource]:
+def lockstep_sources(scenario: Scenario, size_m: tuple[float, float]) -> dict[str, LockstepSource]:
     """Return the source of each group that has one in lockstep, by the group's name.
 
     BadInput names the scenario or the trace's file, the key and what was expected.
     """
-    sources: dict[str, PoseSource] = {}
+    sources: dict[str, LockstepSource] = {}
     for name, table in scenario.robots.items():
         if isinstance(table.motion, TraceMotion):
             sources[name] = _trace_source(scenario, name, table, table.motion, size_m)
@@ -90,7 +82,7 @@ def motion_files(scenario: Scenario) -> dict[str, Path]:
 
 def _trace_source(
     scenario: Scenario, name: str, table: RobotsTable, motion: TraceMotion, size_m: tuple[float, float]
-) -> PoseSource:
+) -> TracePoses:
     key, path = f"robots.{name}.motion", motion_files(scenario)[name]
     if not path.is_file():
         raise BadInput(scenario.source, f"{key}.file", f"expected a file beside the scenario: there is no {path}")
@@ -98,7 +90,7 @@ def _trace_source(
     order = _order(trace, motion.robots, table.count, scenario.source, key)
     if scenario.arena.boundary == "walls":
         _check_within(trace, order, size_m, str(path), motion.offset_m)
-    return TraceSource(TracePoses(trace, order, motion.start_s))
+    return TracePoses(trace, order, motion.start_s)
 
 
 def _order(trace: MotionTrace, robots: Sequence[str], count: int, where: str, key: str) -> list[int]:
