@@ -24,6 +24,7 @@ from swarmwire.world.scenario_file import scenario_from
 
 RATE_HZ = 10
 SIDE_M = 500.0
+# The program of another process that sends, like a simulator, at a steady rate of the wall clock.
 SENDER = """
 import json, socket, sys, time
 out, start_s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), time.monotonic()

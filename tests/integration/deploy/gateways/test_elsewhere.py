@@ -54,7 +54,7 @@ def distance_m(pose: FloatArray) -> float:
 
 @contextmanager
 def running(simulation: Simulation) -> Generator[None]:
-    """The run goes on in a thread within the context."""
+    """Run the simulation in a thread within the context."""
     thread = Thread(target=simulation.run)
     thread.start()
     try:

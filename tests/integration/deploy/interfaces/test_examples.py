@@ -182,7 +182,7 @@ def test_babeld_routes_over_many_hops_and_around_a_dead_robot(tmp_path):
 
 @needs_program("babeld", "ping", "ip")
 def test_babeld_routes_between_walkers_of_a_trace_over_several_hops(tmp_path):
-    """The trace says who is near whom at the start; the two farthest walkers that are connected need other ones."""
+    """The trace gives the distances at the start; the two farthest walkers that are connected need others between."""
     scenario = (ROOT / "examples" / "motion" / "mesh.toml").read_text()
     scenario = scenario.replace("../../scenarios", f"{ROOT}/scenarios").replace(
         "../interfaces", f"{ROOT}/examples/interfaces"

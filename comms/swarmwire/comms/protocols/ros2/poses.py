@@ -20,7 +20,7 @@ class SpacePose(NamedTuple):
     heading_rad: float  # nan: not given
 
 
-class FoundPose(NamedTuple):
+class MessagePose(NamedTuple):
     """A pose as a message holds it."""
 
     name: str
@@ -38,15 +38,15 @@ def transform_name(parent: str, frame: str) -> str:
     return f"{parent.removeprefix('/')} {frame.removeprefix('/')}"
 
 
-def poses_of(kind: str, message: Any) -> Iterator[FoundPose]:
+def poses_of(kind: str, message: Any) -> Iterator[MessagePose]:
     """Yield the poses in a message: `ONLY` one, or that of each transform."""
     if kind == TRANSFORMS:
         for stamped in message.transforms:
             name, transform = transform_name(stamped.header.frame_id, stamped.child_frame_id), stamped.transform
-            yield FoundPose(name, stamped.header, transform.translation, transform.rotation)
+            yield MessagePose(name, stamped.header, transform.translation, transform.rotation)
     else:
         pose = message.pose.pose if kind == ODOMETRY else message.pose
-        yield FoundPose(ONLY, message.header, pose.position, pose.orientation)
+        yield MessagePose(ONLY, message.header, pose.position, pose.orientation)
 
 
 def space_pose(position: Any, orientation: Any) -> SpacePose:
