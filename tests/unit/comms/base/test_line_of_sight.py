@@ -140,7 +140,7 @@ def test_lines_in_space_enter_obstacles_where_points_along_them_do() -> None:
     )
     index, entered, rng = indexed((placed,), SIZE_M), np.empty((3, 2)), np.random.default_rng(4)
     shares, overflown = np.linspace(0.0, 1.0, 20_001)[:, None], 0
-    for a, b in rng.uniform([-3.0, -2.0, 0.0], [3.0, 2.0, 1.6], (200, 2, 3)):
+    for a, b in rng.uniform([-3.0, -2.0, 0.0], [3.0, 2.0, 1.6], (140, 2, 3)):
         points = a + shares * (b - a)
         depths = [depth(obstacle, points) for obstacle in placed]
         if min(abs(min(each)) for each in depths) < 1e-3:  # within that of a rim the points might miss it
