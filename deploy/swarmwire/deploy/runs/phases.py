@@ -34,7 +34,7 @@ from swarmwire.deploy.runs.observers import (
     TooLarge,
 )
 from swarmwire.deploy.runs.plan import Plan, make_plan
-from swarmwire.deploy.runs.pose_sources import open_sources
+from swarmwire.deploy.runs.pose_sources import check_live_sources, open_sources
 from swarmwire.deploy.runs.published import ObserverEndpoint, Published
 from swarmwire.deploy.runs.real_time import raised_priority, warm_up
 from swarmwire.deploy.runs.record.folder import RunWriter
@@ -108,8 +108,11 @@ class PreparedRun:
     def open(self, stack: ExitStack, observers: Sequence[Observer], stop_conditions: StopConditions | None) -> Run:
         """Make all parts of the run, which end with the stack; `observers` are those of the caller."""
         plan, writer, static = self.plan, self.writer, self.plan.static
+        # Only here: a scenario can be checked and probed on any machine, and not in real time.
         if plan.interfaces:
-            plan.interfaces.check_machine(static, plan.factor)  # only here: a scenario can be checked on any machine
+            plan.interfaces.check_machine(static, plan.factor)
+        if not plan.config.replay:
+            check_live_sources(plan.scenario, static, in_real_time=plan.factor is not None)
         facts = writer.begin(plan.scenario, plan.facts())
         if self.pace:  # kernels are loaded before gateways answer, and before the pace begins
             world = plan.new_world()

@@ -25,7 +25,6 @@ from swarmwire.deploy.runs.config import (
 from swarmwire.deploy.runs.gateways.gateways import as_gateways
 from swarmwire.deploy.runs.gateways.serving import RunGateways
 from swarmwire.deploy.runs.interfaces import RunInterfaces, run_interfaces
-from swarmwire.deploy.runs.pose_sources import check_live_sources
 from swarmwire.deploy.runs.record.folder import check_folder
 from swarmwire.deploy.runs.record.provenance import RunFacts, cpu, module_digests, versions
 from swarmwire.deploy.runs.scenario_parts import (
@@ -158,8 +157,6 @@ def _check_combination(plan: Plan) -> None:
         plan.gateways.check(static.arenas, plan.runners)
     if plan.interfaces:
         plan.interfaces.check(static)
-    if not config.replay:
-        check_live_sources(plan.scenario, static, in_real_time=plan.factor is not None)
     plan.record.check(static)
     if plan.out is not None:
         check_folder(plan.out)

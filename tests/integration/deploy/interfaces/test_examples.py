@@ -2,7 +2,10 @@
 
 import json
 import re
+import socket
+import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -130,6 +133,49 @@ def test_tcp_is_slower_where_the_radio_loses(tmp_path):
     clean_bps, lossy_bps = rates_bps
     assert 1e6 < clean_bps < 6e6
     assert 1e4 < lossy_bps < 0.5 * clean_bps
+
+
+@needs_program("iperf3")
+def test_iperf3_throughput_follows_the_distance_of_robots_that_another_simulator_moves(tmp_path, monkeypatch):
+    """Rayleigh fading above a threshold that path loss reaches at R: exp(-(d / R)^n) (Rappaport 1996, section 5.6)."""
+    monkeypatch.setenv("IPERF3_S", "8")
+    for example in ("iperf3.sh", "throughput.py", "throughput.toml"):
+        (tmp_path / example).write_bytes((ROOT / "examples" / "motion" / example).read_bytes())
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    scenario = (
+        (tmp_path / "throughput.toml").read_text().replace("../interfaces/standing.py:Standing", "still.py:Still")
+    )
+    options = ("--set", f'robots.row.motion.listen="{address}"', "--set", "duration_s=13", "--packets", "all")
+    command = [sys.executable, str(ROOT / "examples" / "motion" / "simulator.py"), address, "60", "9"]
+    log = tmp_path / "out" / "log.txt"
+
+    def simulator() -> subprocess.Popen[bytes]:
+        until(lambda: log.exists() and address in log.read_text())  # the run is open for poses
+        return subprocess.Popen(command)
+
+    with ThreadPoolExecutor(1) as pool:
+        started = pool.submit(simulator)
+        with running(tmp_path, scenario, *options) as world:
+            world.process.wait(60.0)
+        started.result().kill()
+        started.result().wait()
+    done = subprocess.run(
+        [sys.executable, str(tmp_path / "throughput.py"), str(world.folder)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    rows = [[float(number) for number in re.findall(r"[\d.]+", row)] for row in done.stdout.splitlines()[1:]]
+    assert len(rows) >= 4, done.stderr
+    reach_m = 10 ** ((16.0 + 82.0 - 20 * np.log10(4 * np.pi * 5.18e9 / 299_792_458)) / 30)
+    for distance_m, measured_mbps, _ in rows:  # within a second the distance changes by up to 20 m
+        nearest, farthest = np.exp(-(((distance_m + np.array([-10, 10])).clip(10, 70) / reach_m) ** 3))
+        assert farthest - 0.2 < measured_mbps < nearest + 0.2
+    assert np.mean([measured - expected for _, measured, expected in rows]) == pytest.approx(0.0, abs=0.1)
+    fates = json.loads((world.folder / "summary.json").read_text())["radio"]["fates"]
+    assert fates["out_of_range"] > 0
 
 
 def test_zenoh_peers_find_one_another_by_multicast(tmp_path):
