@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import fields
+from fcntl import LOCK_EX, flock
 from pathlib import Path
 from typing import Any
 
@@ -34,16 +35,21 @@ from tests.docs.pages import ROOT
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory) -> Path:
-    """The built site; the build fails with any warning."""
-    place = tmp_path_factory.mktemp("site")
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-n", "-q", "-d", place / "doctrees"]
-    done = subprocess.run(
-        [*command, ROOT / "docs", place / "html"], capture_output=True, text=True, check=False, timeout=110
-    )
-    assert done.returncode == 0, done.stderr
-    assert not done.stderr
-    return place / "html"
+def site(tmp_path_factory, testrun_uid) -> Path:
+    """The built site, which pytest's processes share; the build fails with any warning."""
+    folder = tmp_path_factory.getbasetemp().parent / f"site-{testrun_uid}"
+    folder.mkdir(exist_ok=True)
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-n", "-q", "-d", folder / "doctrees"]
+    with (folder / "lock").open("w") as lock:
+        flock(lock, LOCK_EX)
+        if not (folder / "built").exists():
+            done = subprocess.run(
+                [*command, ROOT / "docs", folder / "html"], capture_output=True, text=True, check=False, timeout=110
+            )
+            assert done.returncode == 0, done.stderr
+            assert not done.stderr
+            (folder / "built").touch()
+    return folder / "html"
 
 
 def page(site: Path, name: str) -> str:
