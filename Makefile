@@ -6,8 +6,8 @@ export UV_PYTHON_DOWNLOADS := never
 unexport PYTHONDONTWRITEBYTECODE # containers often set it; each of the many processes would compile its imports anew
 export PYRIGHT_PYTHON_IGNORE_WARNINGS := 1 # does not ask the network for a newer version
 
-# Two processes; the one that has no tests left takes over from the other.
-PYTEST := $(RUN) pytest -q -n 2 --dist worksteal --durations 20 --durations-min 0.5
+# Two processes, since most machines of CI have two cores; the one that has no tests left takes over from the other.
+PYTEST := $(RUN) pytest -q -n $(or $(WORKERS),2) --dist worksteal --durations 20 --durations-min 0.5
 # zenoh gives up a connection attempt when the other side does not answer in time, which happens when other programs
 # use both cores. Such a test runs once more, and pytest prints "rerun". A wrong value is never tried again.
 RERUNS := --reruns 1 --only-rerun ZError

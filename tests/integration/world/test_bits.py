@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 
@@ -16,8 +17,16 @@ ENVIRONMENTS = {
 }
 
 
+def _cases() -> list[Any]:
+    """Each environment; that which compiles all kernels anew takes minutes."""
+    return [
+        pytest.param(changes, id=name, marks=[pytest.mark.slow] if "NUMBA_CPU_NAME" in changes else [])
+        for name, changes in ENVIRONMENTS.items()
+    ]
+
+
 @pytest.mark.timeout(900)
-@pytest.mark.parametrize("changes", ENVIRONMENTS.values(), ids=ENVIRONMENTS)
+@pytest.mark.parametrize("changes", _cases())
 def test_hashes_of_shipped_scenarios_are_equal_with(changes: dict[str, str]) -> None:
     if "NUMBA_CPU_NAME" in changes and os.uname().machine != "x86_64":
         pytest.skip("its target is x86-64")
