@@ -68,6 +68,11 @@ COMMANDS = {
         "compare:compare_command",
         "Compare two campaigns: medians, their difference and its interval, at each common design point.",
     ),
+    "expect": CommandEntry(
+        EXPERIMENTS,
+        "compare:expect_command",
+        "Check that a run or a campaign meets expectations: a line each, and exit code 1 if one is not met.",
+    ),
     "report": CommandEntry(
         EXPERIMENTS,
         "compare:report_command",

@@ -1,4 +1,4 @@
-"""The commands `compare`, `report` and `sim-to-real`: results of campaigns, runs and robots' logs."""
+"""The commands `compare`, `expect`, `report` and `sim-to-real`: results of campaigns, runs and robots' logs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -29,6 +29,37 @@ def compare_command(
     from swarmwire.deploy.cli.actions.compare import compare_campaigns
 
     compare_campaigns(a, b, response or [], to)
+
+
+def expect_command(
+    folder: Annotated[
+        str,
+        typer.Argument(help="The folder of a run or of a campaign; FOLDER@radio.loss=0.4 is a part.", metavar="DIR"),
+    ],
+    expectations: Annotated[
+        list[str],
+        typer.Argument(
+            help="'order.final >= 0.9', 'stop_time_s.mean < 60', 'radio.pdr > 0.5 in 80 % of runs'.",
+            metavar="EXPECTATION...",
+        ),
+    ],
+    junit: Annotated[
+        Path | None, typer.Option(help="Also write a JUnit report, as services of CI show it.", metavar="FILE.xml")
+    ] = None,
+) -> None:
+    """Check that a run or a campaign meets expectations: a line each, and exit code 1 if one is not met.
+
+    A name is a column of the campaign's table, a metric for its last value, or with .mean its mean over the runs
+    instead of the median. At each design point the whole 95 % interval must meet the bound, or with "in 80 % of runs"
+    the lower end of the interval of that share. A failed or missing run meets nothing. For example:
+
+      swarmwire expect campaigns/loss@radio.loss=0.2 'order.final >= 0.9'
+
+      swarmwire expect runs/today 'radio.pdr >= 0.5' 'counts.nan_commands <= 0' --junit expect.xml
+    """
+    from swarmwire.deploy.cli.actions.expect import check_expectations
+
+    check_expectations(folder, expectations, junit)
 
 
 def report_command(
