@@ -12,7 +12,7 @@ from swarmwire.deploy.terminal.console import TerminalConsole, print_rows
 from swarmwire.deploy.terminal.output import echo
 from swarmwire.metrics.records.campaign.expectations import Verdict, parse_expectation, verdicts
 
-COLUMNS = ("", "expected", "at", "measured")
+COLUMNS = ("result", "expected", "at", "measured")
 
 
 def check_expectations(folder: str, expectations: Sequence[str], junit: Path | None) -> None:
