@@ -1,6 +1,7 @@
 """Robots that others move: the shipped trace, and poses by UDP and of a tracker in real time."""
 
 import json
+import shutil
 import socket
 import subprocess
 import sys
@@ -110,6 +111,20 @@ def test_traced_run_can_be_exported_and_followed_again(tmp_path, suffix):
     assert again.radio is not None
     assert first.radio is not None
     assert again.radio.fates["received"] == pytest.approx(first.radio.fates["received"], rel=0.02)
+
+
+def test_recorded_run_is_followed_bit_for_bit_and_the_second_run_needs_neither(tmp_path):
+    overrides = ["duration_s=2", "time.rate_hz=30", "robots.walkers.motion.start_s=40"]  # 1/30 s is no whole ns
+    run(TRACED, overrides=overrides, out=tmp_path / "first")
+    names = ["walkers-7", "walkers-2"]
+    motion = ["robots.walkers.count=2", f"robots.walkers.motion={{source='trace', file='first', robots={names}}}"]
+    (tmp_path / "again.toml").write_text(TRACED.read_text())
+    run(tmp_path / "again.toml", overrides=[*overrides[:2], *motion], out=tmp_path / "again")
+    before, after = (RunFolder(tmp_path / name).ticks() for name in ("first", "again"))
+    for column in ("x_m", "y_m", "z_m", "heading_rad"):
+        np.testing.assert_array_equal(after[column].to_numpy(), before[column].to_numpy()[:, [7, 2]])
+    shutil.rmtree(tmp_path / "first")
+    assert repeat(tmp_path / "again").same
 
 
 def test_udp_poses_decide_who_is_in_range_and_the_run_repeats_without_them(tmp_path):

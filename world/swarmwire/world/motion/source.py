@@ -71,7 +71,7 @@ def lockstep_sources(scenario: Scenario, size_m: tuple[float, float]) -> dict[st
 
 
 def motion_files(scenario: Scenario) -> dict[str, Path]:
-    """Return the path of each group's trace, by the group's name."""
+    """Return the path of each group's trace, a file or a folder, by the group's name."""
     folder = folder_of(scenario.source)
     return {
         name: (folder / table.motion.file).resolve()
@@ -84,8 +84,8 @@ def _trace_source(
     scenario: Scenario, name: str, table: RobotsTable, motion: TraceMotion, size_m: tuple[float, float]
 ) -> TracePoses:
     key, path = f"robots.{name}.motion", motion_files(scenario)[name]
-    if not path.is_file():
-        raise BadInput(scenario.source, f"{key}.file", f"expected a file beside the scenario: there is no {path}")
+    if not path.exists():
+        raise BadInput(scenario.source, f"{key}.file", f"expected a path from the scenario's folder: no {path}")
     trace = read_trace(path, origin=motion.origin).shifted(*motion.offset_m)
     order = _order(trace, motion.robots, table.count, scenario.source, key)
     if scenario.arena.boundary == "walls":

@@ -8,13 +8,13 @@ from swarmwire.world.scenario.tables import Point, ScenarioTable
 
 
 class TraceMotion(ScenarioTable):
-    """Poses of a file: a trace of BonnMotion, ns-2, EMANE or ROS 2, or a table."""
+    """Poses of a file: a trace of BonnMotion, ns-2, EMANE or ROS 2, a table, or a recorded run."""
 
     source: Literal["trace"]
     """Poses of a file, which the robots follow in every arena."""
     file: str = Field(min_length=1)
-    """Path, relative to the scenario: .movements, .movements.gz, .tcl, .ns_movements, .eel, .csv, .parquet or
-    .mcap."""
+    """Path, relative to the scenario: .movements, .movements.gz, .tcl, .ns_movements, .eel, .csv, .parquet,
+    .mcap, or the folder of a run."""
     robots: tuple[str, ...] = Field(default=(), strict=False)
     """Names or numbers of the file's robots, in the order of the group's; default: all, in the file's order."""
     start_s: float = Field(default=0.0, ge=-1e9, le=1e9, json_schema_extra={"unit": "s"})

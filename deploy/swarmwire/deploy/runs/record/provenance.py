@@ -33,6 +33,7 @@ from swarmwire.deploy.runs.scenario_parts import trace_path
 from swarmwire.metrics.measures.metric import MetricInfo
 from swarmwire.metrics.records.run_folder.layout import RUN_FORMAT, RUN_JSON, SCENARIO, CopiedFile
 from swarmwire.world.motion.source import motion_files
+from swarmwire.world.motion.traces.reading import files_of
 from swarmwire.world.placement.maps import path_near_scenario
 from swarmwire.world.scenario.bodies import sheet_path
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
@@ -187,7 +188,7 @@ def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
     if trace is not None:
         mapping["radio"]["trace"]["file"] = copies.add(trace, "trace")
     for group, path in motion_files(scenario).items():
-        mapping["robots"][group]["motion"]["file"] = copies.add(path, "motion")
+        mapping["robots"][group]["motion"]["file"] = copies.add_trace(path, "motion")
     for group in mapping["robots"].values():
         if "kind" in group.get("motion", {}):
             group["motion"]["kind"] = copies.class_of(group["motion"]["kind"], folder, "motion")
@@ -232,13 +233,18 @@ class Copies:
     def add(self, original: Path, role: str, content: bytes | None = None) -> str:
         """Copy a file once, or write `content` instead; return the path within the run folder."""
         if original not in self._paths:
-            path = self._free_path(original)
-            data = original.read_bytes() if content is None else content
-            make_subfolder(self.folder / FILES)
-            write_bytes(self.folder / path, data)
-            self._paths[original] = path
-            self.files.append(CopiedFile(path, _sha256(data), role))
+            self._paths[original] = self._free_path(original)
+            self._write(self._paths[original], original.read_bytes() if content is None else content, role)
         return self._paths[original]
+
+    def add_trace(self, original: Path, role: str) -> str:
+        """Copy a trace once, a file or those of a folder; return the path within the run folder."""
+        if original.is_dir() and original not in self._paths:
+            self._paths[original] = self._free_path(original)
+            for file in files_of(original):
+                path = Path(self._paths[original], file.relative_to(original))
+                self._write(path.as_posix(), file.read_bytes(), role)
+        return self.add(original, role)
 
     def class_of(self, spec: str, folder: Path, role: str) -> str:
         """Copy the file of a class, if it has one, relative to `folder`; return the spec with the path of the copy."""
@@ -250,6 +256,12 @@ class Copies:
         if isinstance(item, str):
             return self.class_of(item, folder, "metric")
         return {**item, "metric": self.class_of(item["metric"], folder, "metric")}
+
+    def _write(self, path: str, data: bytes, role: str) -> None:
+        for parent in reversed(Path(path).parents):
+            make_subfolder(self.folder / parent)
+        write_bytes(self.folder / path, data)
+        self.files.append(CopiedFile(path, _sha256(data), role))
 
     def _free_path(self, original: Path) -> str:
         used, path, number = set(self._paths.values()), f"{FILES}/{original.name}", 1

@@ -1,11 +1,11 @@
-"""Files of motion traces; the suffix of the name chooses the format."""
+"""Files of motion traces; the suffix of the name chooses the format, and a folder is that of a run."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.world.motion.traces import bonnmotion, emane, mcap, ns2, table
+from swarmwire.world.motion.traces import bonnmotion, emane, mcap, ns2, run_folder, table
 from swarmwire.world.motion.traces.emane import Origin
 from swarmwire.world.motion.traces.trace import MotionTrace
 
@@ -28,6 +28,8 @@ def read_trace(path: Path, *, origin: Origin | None = None) -> MotionTrace:
 
     BadInput for a file that cannot be read, and for its first fault.
     """
+    if path.is_dir():
+        return _folder_format(path).read(path)
     suffix = suffix_of(path)
     if suffix != EEL:
         return FORMATS[suffix].read(path)
@@ -35,6 +37,11 @@ def read_trace(path: Path, *, origin: Origin | None = None) -> MotionTrace:
         expected = "expected an origin: latitude and longitude in degrees and height in m of the point (0, 0, 0)"
         raise BadInput(str(path), "", expected)
     return emane.read(path, origin)
+
+
+def files_of(folder: Path) -> list[Path]:
+    """Return the files of a folder that its trace needs; BadInput if it has no trace."""
+    return _folder_format(folder).files(folder)
 
 
 def write_trace(path: Path, trace: MotionTrace, *, origin: Origin = (0.0, 0.0, 0.0)) -> None:
@@ -52,3 +59,10 @@ def suffix_of(path: Path) -> str:
         if path.name.lower().endswith(suffix):
             return suffix
     raise BadInput(str(path), "", f"expected a file name that ends in {', '.join(FORMATS)}")
+
+
+def _folder_format(folder: Path) -> Any:
+    """Return the module that reads a folder; BadInput if there is none."""
+    if (folder / run_folder.STATIC).is_file():
+        return run_folder
+    raise BadInput(str(folder), "", f"expected the folder of a run: it has no {run_folder.STATIC}")

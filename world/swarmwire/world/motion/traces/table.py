@@ -4,6 +4,8 @@ The columns may be in any order, and others are ignored. Rows may be sorted by t
 that is not given.
 """
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +61,22 @@ def write(path: Path, trace: MotionTrace) -> None:
         frame.write_csv(path)
 
 
+@contextmanager
+def refuse_damage(path: Path) -> Generator[None]:
+    """Raise BadInput if a table cannot be read within the context."""
+    import polars as pl
+
+    try:
+        yield
+    except OSError as error:
+        raise BadInput(str(path), "", f"expected a readable file: {error.strerror}") from None
+    except pl.exceptions.NoDataError:
+        raise refuse_empty(path) from None
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
+        reason = str(error).partition("\n")[0]
+        raise BadInput(str(path), "", f"expected an intact table: {reason}") from None
+
+
 def _in_order(values: AnyArray, order: IntArray | None) -> AnyArray:
     return values if order is None else values[order]
 
@@ -76,21 +94,13 @@ class TraceTable:
     def _read(self) -> Any:
         import polars as pl
 
-        try:
-            with self._path.open("rb") as file:
-                if self._is_csv:
-                    frame = pl.read_csv(file, infer_schema=False).rename(str.strip)
-                    return frame.select(pl.col(self._columns(frame.columns)).str.strip_chars())
-                columns = self._columns(list(pl.read_parquet_schema(file)))
-                file.seek(0)
-                return pl.read_parquet(file, columns=columns)
-        except OSError as error:
-            raise BadInput(str(self._path), "", f"expected a readable file: {error.strerror}") from None
-        except pl.exceptions.NoDataError:
-            raise refuse_empty(self._path) from None
-        except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
-            reason = str(error).partition("\n")[0]
-            raise BadInput(str(self._path), "", f"expected an intact table: {reason}") from None
+        with refuse_damage(self._path), self._path.open("rb") as file:
+            if self._is_csv:
+                frame = pl.read_csv(file, infer_schema=False).rename(str.strip)
+                return frame.select(pl.col(self._columns(frame.columns)).str.strip_chars())
+            columns = self._columns(list(pl.read_parquet_schema(file)))
+            file.seek(0)
+            return pl.read_parquet(file, columns=columns)
 
     def _columns(self, columns: list[str]) -> list[str]:
         for column in NEEDED:
