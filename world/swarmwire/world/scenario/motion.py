@@ -14,7 +14,7 @@ class TraceMotion(ScenarioTable):
     """Poses of a file, which the robots follow in every arena."""
     file: str = Field(min_length=1)
     """Path, relative to the scenario: .movements, .movements.gz, .tcl, .ns_movements, .eel, .csv, .parquet,
-    .mcap, or the folder of a run."""
+    .mcap, .db3, or the folder of a run or of rosbag2."""
     robots: tuple[str, ...] = Field(default=(), strict=False)
     """Names or numbers of the file's robots, in the order of the group's; default: all, in the file's order."""
     start_s: float = Field(default=0.0, ge=-1e9, le=1e9, json_schema_extra={"unit": "s"})

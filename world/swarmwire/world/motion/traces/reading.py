@@ -1,16 +1,16 @@
-"""Files of motion traces; the suffix of the name chooses the format, and a folder is that of a run."""
+"""Files of motion traces; the suffix of the name chooses the format, or a file in a folder."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.world.motion.traces import bonnmotion, emane, mcap, ns2, run_folder, table
+from swarmwire.world.motion.traces import bonnmotion, emane, ns2, rosbag, run_folder, table
 from swarmwire.world.motion.traces.emane import Origin
 from swarmwire.world.motion.traces.trace import MotionTrace
 
 EEL = ".eel"
-FORMATS: Mapping[str, Any] = {  # modules with `read` and `write`; mcap has no `write`
+FORMATS: Mapping[str, Any] = {  # modules with `read` and `write`; rosbag has no `write`
     ".movements": bonnmotion,
     ".movements.gz": bonnmotion,
     ".tcl": ns2,
@@ -19,7 +19,12 @@ FORMATS: Mapping[str, Any] = {  # modules with `read` and `write`; mcap has no `
     EEL: emane,
     ".csv": table,
     ".parquet": table,
-    ".mcap": mcap,
+    ".mcap": rosbag,
+    ".db3": rosbag,
+}
+FOLDER_FORMATS: Mapping[str, Any] = {  # by a file in the folder; modules with `read` and `files`
+    run_folder.STATIC: run_folder,
+    rosbag.METADATA: rosbag,
 }
 
 
@@ -63,6 +68,8 @@ def suffix_of(path: Path) -> str:
 
 def _folder_format(folder: Path) -> Any:
     """Return the module that reads a folder; BadInput if there is none."""
-    if (folder / run_folder.STATIC).is_file():
-        return run_folder
-    raise BadInput(str(folder), "", f"expected the folder of a run: it has no {run_folder.STATIC}")
+    for name, module in FOLDER_FORMATS.items():
+        if (folder / name).is_file():
+            return module
+    expected = f"expected the folder of a run, with {run_folder.STATIC}, or of a bag, with {rosbag.METADATA}"
+    raise BadInput(str(folder), "", expected)

@@ -1,7 +1,8 @@
-"""MCAP files of ROS 2, as rosbag2 records them: each topic of Odometry or PoseStamped is a robot, as is each transform.
+"""Bags of ROS 2, folders or their files: each topic of Odometry or PoseStamped is a robot, as is each transform.
 
-A robot's name is its topic, `/robot_1/odom`, or a topic of TFMessage, parent and frame, `/tf map robot_1/base_link`.
-Times are those of the stamps, and count from the first one. Topics of other types are ignored.
+A folder has `metadata.yaml` and one or several files, `.mcap` or `.db3`, also compressed. A robot's name is its topic,
+`/robot_1/odom`, or a topic of TFMessage, parent and frame, `/tf map robot_1/base_link`. Times are those of the stamps,
+and count from the first one. Topics of other types are ignored.
 """
 
 import re
@@ -22,6 +23,8 @@ from swarmwire.world.motion.traces.lines import MAX_NUMBER, refuse_empty
 from swarmwire.world.motion.traces.trace import MotionTrace
 
 KINDS = (ODOMETRY, POSE_STAMPED, TRANSFORMS)
+METADATA = "metadata.yaml"
+STORAGES = (".mcap", ".db3", ".zstd")
 DISTRO = "jazzy"  # these types are equal in all distributions
 
 
@@ -30,6 +33,11 @@ class StampedPose(NamedTuple):
 
     stamp_ns: int
     pose: SpacePose
+
+
+def files(folder: Path) -> list[Path]:
+    """Return the files of the folder of a bag."""
+    return [folder / METADATA, *sorted(path for path in folder.iterdir() if path.suffix in STORAGES)]
 
 
 def read(path: Path) -> MotionTrace:
@@ -70,17 +78,21 @@ def _samples(path: Path) -> Iterator[tuple[str, StampedPose]]:
 
 
 def _payloads(path: Path) -> Iterator[tuple[str, str, bytes]]:
-    """Yield topic, type and payload of each message that may hold poses; BadInput for a damaged file."""
+    """Yield topic, type and payload of each message that may hold poses; BadInput for a damaged bag."""
     from rosbags.rosbag2 import Reader
 
     try:
         with Reader(path) as reader:
             if chosen := [connection for connection in reader.connections if connection.msgtype in KINDS]:
+                missing = sum(connection.msgcount for connection in chosen)
                 for connection, _, payload in reader.messages(chosen):
+                    missing -= 1
                     yield connection.topic, connection.msgtype, bytes(payload)
+                if missing:  # the reader skips a file whose topics are others than those of metadata.yaml
+                    raise ValueError(f"{missing} of the messages that it should have are missing")
     except Exception as error:  # noqa: BLE001 - the reader trusts the bytes that it reads: damage may raise anything
         reason = str(error).partition("\n")[0] or type(error).__name__
-        raise BadInput(str(path), "", f"expected an intact MCAP file of ROS 2: {reason}") from None
+        raise BadInput(str(path), "", f"expected an intact bag of ROS 2: {reason}") from None
 
 
 def _natural(name: str) -> list[Any]:
