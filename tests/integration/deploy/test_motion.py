@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pymavlink import mavutil
 
 from swarmwire.agent import pose_feed
 from swarmwire.comms.base.errors import BadInput
@@ -160,6 +161,35 @@ def test_udp_poses_decide_who_is_in_range_and_the_run_repeats_without_them(tmp_p
     again = repeat(tmp_path / "run")
     assert again.same
     assert again.result.radio == result.radio
+
+
+def test_mavlink_poses_of_two_vehicles_decide_who_is_in_range_and_are_recorded(tmp_path):
+    port = free_port(socket.SOCK_DGRAM)
+    path = scenario(tmp_path, "mavlink", f'listen = "udpin:127.0.0.1:{port}", origin = [0.0, 0.0, 100.0]')
+    vehicles = [
+        mavutil.mavlink_connection(f"udpout:127.0.0.1:{port}", source_system=k, source_component=1) for k in (1, 2)
+    ]
+
+    def send(_: int) -> None:
+        for vehicle, longitude in zip(vehicles, (0, 300), strict=True):
+            vehicle.mav.heartbeat_send(2, 3, 0, 0, 4)  # of an ArduPilot quadrotor, which is active
+            vehicle.mav.global_position_int_send(0, 100, longitude, 102_500, 0, 0, 0, 0, 9_000)
+
+    try:
+        with sending(send):
+            result = run(path, realtime=1.0, out=tmp_path / "run")
+    finally:
+        for vehicle in vehicles:
+            vehicle.close()
+    assert (result.counts.get("poses_malformed", 0), result.counts.get("poses_of_unknown", 0)) == (0, 0)
+    assert result.radio is not None
+    assert result.radio.fates["received"] > 20
+    ticks = RunFolder(tmp_path / "run").ticks()
+    # At the equator the radius of curvature is a = 6378137 m to the east, a (1 - e2) = 6335439.327 m to the north.
+    assert ticks["x_m"].to_numpy()[-1] == pytest.approx([0.0, (6378137.0 + 102.5) * np.deg2rad(3e-5)], rel=1e-6)
+    assert ticks["y_m"].to_numpy()[-1] == pytest.approx([(6335439.327 + 102.5) * np.deg2rad(1e-5)] * 2, rel=1e-6)
+    assert ticks["z_m"].to_numpy()[-1] == pytest.approx([2.5, 2.5])
+    assert ticks["heading_rad"].to_numpy()[-1] == pytest.approx([0.0, 0.0])
 
 
 def test_tracker_poses_move_robots(tmp_path):

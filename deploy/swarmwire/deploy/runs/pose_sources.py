@@ -8,14 +8,16 @@ from swarmwire.comms.base.clock import Clock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import Static
 from swarmwire.world.motion.live import LiveSource
+from swarmwire.world.motion.mavlink import MavlinkSource
 from swarmwire.world.motion.ros2 import Ros2Source
 from swarmwire.world.motion.tracker import TrackerSource
 from swarmwire.world.motion.udp import UdpSource
-from swarmwire.world.scenario.motion import LiveMotion, Ros2Motion, TrackerMotion, UdpMotion
+from swarmwire.world.scenario.motion import LiveMotion, MavlinkMotion, Ros2Motion, TrackerMotion, UdpMotion
 from swarmwire.world.scenario.scenario import Scenario
 
 SOURCES: dict[type[LiveMotion], type[LiveSource]] = {
     UdpMotion: UdpSource,
+    MavlinkMotion: MavlinkSource,
     TrackerMotion: TrackerSource,
     Ros2Motion: Ros2Source,
 }

@@ -2,7 +2,7 @@
 
     [robots.NAME.motion]      scenario/motion.py   the source of a group's poses, and its settings
     a source in lockstep      source.py            a pose for every time: traces, classes of users
-    a live source             live.py              poses as they arrive: udp.py, tracker.py, ros2.py
+    a live source             live.py              poses as they arrive: udp.py, mavlink.py, tracker.py, ros2.py
     `FollowedRobots`          followed.py          where these robots are at the end of each tick
     the engines               engines/             move them there; other robots push against them in vain
 

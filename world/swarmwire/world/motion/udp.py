@@ -10,6 +10,7 @@ Other keys are ignored.
 import math
 import socket
 import threading
+from abc import abstractmethod
 
 import msgspec
 
@@ -33,20 +34,23 @@ class PoseMessage(msgspec.Struct):
     heading_rad: float = math.nan
 
 
-class UdpSource(LiveSource):
+class DatagramSource(LiveSource):
     """Receives datagrams in a thread of its own."""
 
-    def open(self) -> None:
-        """Bind the address and begin to receive; BadInput if it is in use or no address."""
-        assert isinstance(self.motion, UdpMotion)
-        host, _, port = self.motion.listen.rpartition(":")
+    @abstractmethod
+    def take(self, datagram: bytes) -> None:
+        """Take the poses in a datagram; its thread calls this."""
+
+    def listen(self, address: str) -> None:
+        """Bind an address and begin to receive; BadInput if it is in use or no address."""
+        host, _, port = address.rpartition(":")
         key = "listen"
         if not host or not port.isdecimal() or int(port) > MAX_PORT:
-            raise BadInput(self.motion.listen, key, 'expected an address and a port, such as "127.0.0.1:9870"')
+            raise BadInput(address, key, 'expected an address and a port, such as "127.0.0.1:9870"')
         try:
             self._socket = _bound(host.strip("[]"), int(port))
         except OSError as error:
-            raise BadInput(self.motion.listen, key, f"expected an address that is free: {error}") from error
+            raise BadInput(address, key, f"expected an address that is free: {error}") from error
         self._socket.settimeout(POLL_S)
         self.address = f"udp {host}:{self._socket.getsockname()[1]}"
         self._is_open = True
@@ -60,16 +64,32 @@ class UdpSource(LiveSource):
         self._socket.close()
 
     def _receive(self) -> None:
-        decode, receive = msgspec.json.Decoder(PoseMessage).decode, self._socket.recv
         while self._is_open:
             try:
-                message = decode(receive(MAX_DATAGRAM_BYTES))
+                datagram = self._socket.recv(MAX_DATAGRAM_BYTES)
             except TimeoutError:
                 continue
-            except (msgspec.MsgspecError, UnicodeDecodeError):
-                self.count("poses_malformed")
-            else:
-                self.put(message.robot, message.x_m, message.y_m, message.z_m, message.heading_rad)
+            self.take(datagram)
+
+
+class UdpSource(DatagramSource):
+    """Takes JSON objects."""
+
+    motion: UdpMotion
+
+    def open(self) -> None:
+        """Begin to receive; BadInput if the address is in use or no address."""
+        self._decode = msgspec.json.Decoder(PoseMessage).decode
+        self.listen(self.motion.listen)
+
+    def take(self, datagram: bytes) -> None:
+        """Take the pose in a datagram."""
+        try:
+            message = self._decode(datagram)
+        except (msgspec.MsgspecError, UnicodeDecodeError):
+            self.count("poses_malformed")
+        else:
+            self.put(message.robot, message.x_m, message.y_m, message.z_m, message.heading_rad)
 
 
 def _bound(host: str, port: int) -> socket.socket:

@@ -56,6 +56,20 @@ class UdpMotion(_LiveMotion):
     """Address and port on which they are received; port 0: a free port, which the run prints."""
 
 
+class MavlinkMotion(_LiveMotion):
+    """Poses of MAVLink by UDP, as PX4, ArduPilot and their simulators send them."""
+
+    source: Literal["mavlink"]
+    """Poses of MAVLink by UDP, as PX4, ArduPilot and their simulators send them."""
+    listen: str = Field(default="127.0.0.1:14550", min_length=1)
+    """Address and port on which they are received, also in the spelling of pymavlink, "udpin:127.0.0.1:14550"."""
+    systems: tuple[Annotated[int, Field(ge=1, le=255)], ...] = Field(default=(), strict=False)
+    """System ids of the vehicles, in the order of the group's robots; default: 1, 2, …"""
+    origin: Annotated[tuple[float, float, float], Field(strict=False)] | None = None
+    """Latitude and longitude in degrees and altitude in m of the arena's origin, for positions of GLOBAL_POSITION_INT;
+    default: positions are those of LOCAL_POSITION_NED."""
+
+
 class TrackerMotion(_LiveMotion):
     """Poses of a tracker on the robots' network, such as a camera above a real arena."""
 
@@ -97,5 +111,5 @@ class Ros2Motion(_LiveMotion):
     """Endpoints at which nodes, routers or bridges connect."""
 
 
-LiveMotion = UdpMotion | TrackerMotion | Ros2Motion
+LiveMotion = UdpMotion | MavlinkMotion | TrackerMotion | Ros2Motion
 MotionTable = Annotated[TraceMotion | CustomMotion | LiveMotion, Field(discriminator="source")]
