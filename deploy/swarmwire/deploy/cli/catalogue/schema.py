@@ -134,11 +134,16 @@ def _chosen(node: Node, schema: Node, path: str) -> Iterator[CatalogueParameter]
 
 
 def _joined(keys: dict[str, CatalogueParameter]) -> CatalogueParameter:
-    """Join a key of several tables, by the choice of the table."""
-    helps, expected = {key.help for key in keys.values()}, dict.fromkeys(key.expected for key in keys.values())
-    several = "; ".join(f"{choice}: {key.help}" for choice, key in keys.items())
-    first = next(iter(keys.values()))
-    return replace(first, help=several if len(helps) > 1 else first.help, expected=" or ".join(expected))
+    """Join a key of several tables, by the choice of the table; defaults that differ become part of the help."""
+    first, expected = next(iter(keys.values())), dict.fromkeys(key.expected for key in keys.values())
+    differ = any(key.value != first.value for key in keys.values())
+    helps = {
+        choice: f"{key.help} (default {key.value})" if differ and key.value else key.help
+        for choice, key in keys.items()
+    }
+    several = "; ".join(f"{choice}: {text}" for choice, text in helps.items())
+    text = several if len(set(helps.values())) > 1 else first.help
+    return replace(first, value=None if differ else first.value, help=text, expected=" or ".join(expected))
 
 
 def _parameter(path: str, key: Node, schema: Node, required: bool) -> CatalogueParameter:
