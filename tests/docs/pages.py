@@ -71,7 +71,7 @@ def first_not_printed(command: Command, printed: str) -> str | None:
     """The first line that the page shows and the command did not print in its turn; None if all came."""
     lines = iter(" ".join(line.split()) for line in printed.splitlines())
     for shown in command.shown:
-        pattern = ".*".join(re.escape(part.strip()) for part in shown.split("…"))
+        pattern = ".*".join(re.escape(" ".join(part.split())) for part in shown.split("…"))
         if not any(re.fullmatch(pattern, line) for line in lines):
             return shown
     return None
