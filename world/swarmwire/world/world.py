@@ -20,7 +20,7 @@ from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.observe.truth import Group, Static
 from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.comms.robot.bodies.body import Body
-from swarmwire.comms.robot.tick_io import Actions, GroupReadings, Readings
+from swarmwire.comms.robot.tick_io import Actions, GroupReadings, Readings, SparseTable
 from swarmwire.world.actuation.actuators import Actuators
 from swarmwire.world.actuation.batteries import Batteries
 from swarmwire.world.annotations import LatestValues, States
@@ -170,6 +170,12 @@ class World:
         """Brake robots that are dead, or whose motors failed: their motors only resist."""
         dead = ~self.alive.reshape(self.static.arenas, self.static.robots)
         self._physics.braked[:] = dead | self.actuators.failed.motors
+
+    def set_first_poses(self, poses: SparseTable) -> None:
+        """Place robots of live sources before the first tick, at their first poses in slots x, y, z, heading."""
+        if self._followed and len(poses):
+            self._physics.set_states(self._followed.first_states(self._physics.state, poses))
+            self._update_poses()
 
     def sense(self, tick: int) -> Readings:
         """Return the readings of the robots that are alive and act in a tick, by group, with rising rows."""

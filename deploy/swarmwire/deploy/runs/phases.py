@@ -53,7 +53,7 @@ from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.backend import InterfacesBackend
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
-from swarmwire.world.motion.live import FollowingBackend, LiveSource
+from swarmwire.world.motion.live import FollowingBackend, LiveSource, wait_for_poses
 from swarmwire.world.subtick import Subticks
 from swarmwire.world.world import World
 
@@ -178,12 +178,15 @@ class PreparedRun:
         plan, replay = self.plan, self.plan.config.replay
         acting = backend
         if replay and replay.inputs:
-            acting = ReplayedBackend(backend, replay.inputs, plan.robots, plan.static.rate_hz)
+            acting = ReplayedBackend(
+                backend, replay.inputs, plan.robots, plan.static.rate_hz, self.world.set_first_poses
+            )
         if interfaces:
             subtick_ns = to_ns((plan.subtick_s or 0.0) * self.factor)
             acting = InterfacesBackend(cast("TimedBackend", acting), interfaces.ports, subtick_ns)
         if pose_sources:
-            acting = FollowingBackend(acting, pose_sources)
+            wait = partial(wait_for_poses, pose_sources, self.clock, self.writer.report, self.is_stopped)
+            acting = FollowingBackend(acting, pose_sources, wait, self.world.set_first_poses)
         acting = self.writer.record_actions(acting, partial(self._has_external_actions, backend, log))
         return Loop(
             self.world,

@@ -23,7 +23,6 @@ from swarmwire.deploy.runs.gateways.serving import Served
 from swarmwire.deploy.runs.phases import Run, prepare
 from swarmwire.deploy.runs.result import Outcome, Result, result_of
 from swarmwire.world.backends.runner_reports import RunnerHealth
-from swarmwire.world.motion.live import wait_for_poses
 from swarmwire.world.scenario.scenario import Scenario
 
 OUTSIDE = "a simulation is stepped within its `with` block"
@@ -134,8 +133,7 @@ class Simulation:
             # Set before observers begin, since they read `served` and `health`.
             run = self._run = self._prepared.open(stack, self._observers, self.stop_conditions)
             with run.observers.begin(self.plan.static, agents_join=self.plan.config.listening is not None):
-                run.backend.start()
-                wait_for_poses(run.pose_sources, prepared.clock, prepared.writer.report, prepared.is_stopped)
+                run.loop.backend.start()
             self._resources = stack.pop_all()
         self._start_ns = self._prepared.clock.now_ns()
         return self

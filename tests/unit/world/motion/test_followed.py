@@ -132,6 +132,23 @@ def test_first_live_pose_without_a_heading_keeps_that_of_the_place() -> None:
     assert world.pose[1].tolist() == [-3.0, 2.0, -2.0]
 
 
+@pytest.mark.parametrize("engine", ["kinematic", "discs", "pymunk"])
+def test_live_robot_is_at_its_first_pose_before_the_first_tick(engine: str) -> None:
+    free = {"body": "epuck", "count": 1, "agent": "swarmwire.agent.behaviours:Diffusion"}
+    table = mapping({"source": "udp"}, physics={"engine": engine})
+    table["robots"]["led"]["place"] = {"how": "poses", "poses": [[0.0, 1.0, 0.5], [2.0, 1.0, 0.0]]}
+    table["robots"]["free"] = {**free, "place": {"how": "poses", "poses": [[-2.9, 2.06, 0.0]]}}
+    world = world_of(table)
+    world.set_first_poses(SparseTable(np.array([1, 1, 1, 2]), np.array([0, 1, 2, 0]), np.array([-3.0, 2.0, 0.5, 4.0])))
+    assert world.radio_pose[:2].tolist() == [[0.0, 1.0, 0.5, 0.0], [-3.0, 2.0, 0.0, 0.5]]
+    assert world.pose[2].tolist() == [-2.9, 2.06, 0.0]  # no source moves it
+    assert not world.velocity.any()
+    onsets = world.move(replace(STILL, poses=SparseTable(np.array([1]), np.array([0]), np.array([-2.9]))))
+    assert world.velocity[1] == pytest.approx([1.0, 0.0, 0.0])  # 0.1 m in a tick of 0.1 s
+    assert onsets[0, 0] == 1  # with the free robot, then 6 cm away: both have a radius of 3.5 cm
+    assert world.pose[1] == pytest.approx([-2.9, 2.0, 0.0])
+
+
 @pytest.mark.parametrize(("file", "origin"), [("a.EEL", None), ("a.eel", None), ("a.CSV", [0.0, 0.0, 0.0])])
 def test_origin_is_for_emane_alone_and_always_whatever_the_case_of_the_suffix(file: str, origin: object) -> None:
     settings = {} if origin is None else {"origin": origin}

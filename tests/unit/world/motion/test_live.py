@@ -1,11 +1,13 @@
 """Poses as they arrive: which are used, which are counted, and how old they are."""
 
+from functools import partial
+
 import pytest
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
-from swarmwire.comms.robot.tick_io import Actions, Readings
+from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
 from swarmwire.world.motion.live import FollowingBackend, LiveSource, wait_for_poses
 from swarmwire.world.scenario.motion import UdpMotion
 from tests.support.clocks import FakeClock, StillClock
@@ -107,7 +109,7 @@ def test_age_beyond_the_limit_counts_ticks_and_shows_in_the_report() -> None:
     for _ in range(4):
         clock.time_ns += NS_PER_S // 2
         source.put("a-1", 0.0, 0.0, 0.0, 0.0)
-        source.pop_new()
+        source.count_ages()
     report = source.report()
     assert report.longest_gap_s == {"a-0": 2.0, "a-1": 0.0}
     assert (report.silent_ticks, report.received) == ({"a-0": 2}, 6)
@@ -130,9 +132,9 @@ class StandingAgents:
         return Actions.joined([])
 
 
-def test_first_poses_are_waited_for_and_added_to_the_actions() -> None:
+def test_first_poses_are_waited_for_placed_and_those_of_tick_0() -> None:
     clock = FakeClock()
-    source, lines = given(clock), list[str]()
+    source, lines, placed = given(clock), list[str](), list[SparseTable]()
     source.put("a-0", 1.0, 0.0, 0.0, 0.0)
 
     class PuttingClock(FakeClock):
@@ -140,22 +142,35 @@ def test_first_poses_are_waited_for_and_added_to_the_actions() -> None:
             super().sleep_until(at_ns)
             source.put("a-1", 2.0, 0.0, 0.0, 0.0)
 
-    wait_for_poses([source], PuttingClock(), lines.append, lambda: False)
-    backend = FollowingBackend(StandingAgents(), [source])
+    wait = partial(wait_for_poses, [source], PuttingClock(), lines.append, lambda: False)
+    backend = FollowingBackend(StandingAgents(), [source], wait, placed.append)
+    backend.start()
     assert len(lines) == 1
     assert "a-1" in lines[0]
-    actions = backend.act(0, {}, ReceivedPackets.none(), NO_TX_STATUSES)
-    assert set(actions.poses.rows.tolist()) == {4, 5}
+    source.put("a-0", 1.05, 0.0, 0.0, 0.0)
+    first, second = (backend.act(tick, {}, ReceivedPackets.none(), NO_TX_STATUSES).poses for tick in (0, 1))
+    assert placed[0].value.tolist() == first.value.tolist() == [1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0]
+    assert (second.rows.tolist(), second.value.tolist()) == ([4] * 4, [1.05, 0.0, 0.0, 0.0])
     assert backend.counts() == {"late": 3}
 
 
-def test_robot_without_a_pose_in_time_is_refused() -> None:
+def test_source_without_any_pose_in_time_is_refused() -> None:
     clock = FakeClock()
-    source = given(clock, wait_s=2.0)
-    source.put("a-0", 1.0, 0.0, 0.0, 0.0)
     with pytest.raises(BadInput, match="a-1"):
-        wait_for_poses([source], clock, lambda _: None, lambda: False)
+        wait_for_poses([given(clock, wait_s=2.0)], clock, lambda _: None, lambda: False)
     assert clock.time_ns == pytest.approx(2.0 * NS_PER_S, rel=0.05)
+
+
+def test_robot_without_a_pose_in_time_is_named_and_counts_as_silent() -> None:
+    clock, lines = FakeClock(), list[str]()
+    source = given(clock, wait_s=2.0, max_age_s=3.0)
+    source.put("a-0", 1.0, 0.0, 0.0, 0.0)
+    wait_for_poses([source], clock, lines.append, lambda: False)
+    assert "a-1" in lines[-1]
+    clock.time_ns += 2 * NS_PER_S
+    source.put("a-0", 1.0, 0.0, 0.0, 0.0)
+    source.count_ages()
+    assert source.report().silent_ticks == {"a-1": 1}
 
 
 def test_first_poses_are_not_waited_for_as_the_run_ends() -> None:

@@ -102,6 +102,10 @@ class Engine(Protocol):
         """
         ...
 
+    def set_states(self, states: FloatArray) -> None:
+        """Set the states of the k followed robots at once, (arenas, k, 6), before the first tick."""
+        ...
+
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, n, 2) in m/s; TypeError if the engine has no forces."""
         ...

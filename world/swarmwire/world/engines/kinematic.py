@@ -99,6 +99,10 @@ class KinematicEngine:
         """Set the states of the followed robots at the end of the next tick, (arenas, k, 6)."""
         self._end = end
 
+    def set_states(self, states: FloatArray) -> None:
+        """Set the states of the followed robots at once, (arenas, k, 6)."""
+        self.state[:, self._followed] = states
+
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Raise TypeError: this engine has no forces. Validation refuses scenarios with impulses for it."""
         raise TypeError("the kinematic engine knows no forces")

@@ -98,6 +98,14 @@ class Physics:
             if len(rows):
                 engine.follow(np.ascontiguousarray(end[:, rows]))
 
+    def set_states(self, states: FloatArray) -> None:
+        """Set the states of all followed robots at once, (arenas, k, 6); see `Engine.set_states`."""
+        for engine, rows in zip(self._engines, self._followed, strict=True):
+            if len(rows):
+                engine.set_states(states[:, rows])
+        if len(self._engines) > 1:
+            self._gather()
+
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, robots, 2) in m/s; TypeError for the kinematic engine."""
         for engine, index in zip(self._engines, self._robots, strict=True):

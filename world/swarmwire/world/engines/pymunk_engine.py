@@ -325,6 +325,12 @@ class PymunkEngine:
         """Set the states of the followed robots at the end of the next tick, (arenas, k, 6)."""
         self._end = end
 
+    def set_states(self, states: FloatArray) -> None:
+        """Set the states of the followed robots at once, (arenas, k, 6)."""
+        for space, poses in zip(self._spaces, states[:, :, :3], strict=True):
+            space.set_poses(self._followed, poses)
+        self._read()
+
     def apply_impulse(self, by_mps: FloatArray) -> None:
         """Add to the velocities of robots at once, (arenas, robots, 2) in m/s."""
         for arena in self._moving:

@@ -20,8 +20,8 @@ class FollowedRobots:
     """The robots of all groups that a source moves; they move alike in all arenas.
 
     A robot moves on a straight line, with constant speed, from its pose at a tick's start to that at its end. A robot
-    of a live source stands where it was placed until its first pose, which sets it there without a speed; it keeps each
-    pose until the next one arrives.
+    of a live source stands where it was placed until its first pose, which sets it there without a speed, mostly before
+    the first tick (`first_states`); it keeps each pose until the next one arrives.
 
     Attributes:
         index: (k,) the robot indices that a source moves, rising.
@@ -52,6 +52,12 @@ class FollowedRobots:
         """Height of the lower side of each robot above the floor, (k,)."""
         return self._pose[:, 2]
 
+    def first_states(self, state: FloatArray, poses: SparseTable) -> FloatArray:
+        """Return the states before the first tick, (arenas, k, 6), with the first `poses`; see `end_states`."""
+        at_rest = np.zeros_like(self._has_pose)
+        self._apply(state, poses)
+        return _end_states(state, self.index, self._pose, at_rest, self._has_pose, float(self._rate_hz))
+
     def end_states(self, state: FloatArray, poses: SparseTable) -> FloatArray:
         """Return the states at the end of the next tick, (arenas, k, 6), and count the tick.
 
@@ -62,11 +68,7 @@ class FollowedRobots:
         self._ticks += 1
         had_pose = self._has_pose.copy()
         if len(poses):
-            self._pose[~had_pose, 3] = state[0, self.index[~had_pose], 2]  # for first poses without a heading
-            poses = poses.select(np.flatnonzero(self._is_live[poses.rows]))
-            column = self._column[poses.rows]
-            self._pose[column, poses.slot] = poses.value
-            self._has_pose[column] = True
+            self._apply(state, poses)
         self._read(self._ticks / self._rate_hz)
         return _end_states(state, self.index, self._pose, had_pose, self._has_pose, float(self._rate_hz))
 
@@ -77,6 +79,15 @@ class FollowedRobots:
 
     def _columns(self, group: Group) -> slice:
         return slice(int(self._column[group.start]), int(self._column[group.stop - 1]) + 1)
+
+    def _apply(self, state: FloatArray, poses: SparseTable) -> None:
+        """Keep new poses of robots with a live source; a first pose without a heading keeps that of the place."""
+        is_first = ~self._has_pose
+        self._pose[is_first, 3] = state[0, self.index[is_first], 2]
+        poses = poses.select(np.flatnonzero(self._is_live[poses.rows]))
+        column = self._column[poses.rows]
+        self._pose[column, poses.slot] = poses.value
+        self._has_pose[column] = True
 
     def _read(self, time_s: float) -> None:
         for group in self._groups:

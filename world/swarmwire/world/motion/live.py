@@ -1,4 +1,7 @@
-"""Live sources: the newest pose of each robot as it arrives, and a backend that adds new poses to a tick's actions."""
+"""Live sources: the newest pose of each robot as it arrives, and a backend that adds new poses to a tick's actions.
+
+Robots are at their first poses before tick 0, whose actions have these; later actions have the poses that arrived.
+"""
 
 import math
 from abc import ABC, abstractmethod
@@ -14,11 +17,10 @@ from swarmwire.comms.base.clock import Clock, to_ns, to_s
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import AgentBackend, SubtickMedium, TimedBackend
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
-from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
+from swarmwire.comms.robot.tick_io import NOTHING_SET, Actions, Readings, SparseTable
 from swarmwire.world.scenario.motion import LiveMotion
 
 POLL_NS = to_ns(0.02)  # interval of polls for the first poses
-NEVER_ARRIVED_NS = -1
 POSITION_NOISE_M = 0.1  # two poses may arrive together: a difference up to this is no jump
 
 
@@ -62,8 +64,8 @@ class LiveSource(ABC):
         self._index_of = {name: index for index, name in enumerate(names)}
         self._half_m, self._clock = half_m, clock
         self._pose: FloatArray = np.full((len(names), 4), np.nan)  # x, y, z in m, heading in rad
-        self._arrived_ns = [NEVER_ARRIVED_NS] * len(names)
-        self._is_new = [False] * len(names)
+        self._arrived_ns = [clock.now_ns()] * len(names)  # without a pose: the age counts from now
+        self._has_pose, self._is_new = [False] * len(names), [False] * len(names)
         self._counted = Counter[str]()
         self._received, self._longest_ns, self._silent = 0, [0] * len(names), [0] * len(names)
 
@@ -90,7 +92,7 @@ class LiveSource(ABC):
     def _keep(self, index: int, x_m: float, y_m: float, z_m: float, heading_rad: float) -> None:
         now_ns, (last_x_m, last_y_m, last_z_m, last_heading_rad) = self._clock.now_ns(), self._pose[index].tolist()
         z_m = last_z_m if math.isnan(z_m) else z_m
-        if self._arrived_ns[index] != NEVER_ARRIVED_NS:
+        if self._has_pose[index]:
             climb_m = 0.0 if math.isnan(last_z_m) else z_m - last_z_m
             away_m = math.hypot(x_m - last_x_m, y_m - last_y_m, climb_m)
             if away_m > self.motion.max_speed_mps * to_s(now_ns - self._arrived_ns[index]) + POSITION_NOISE_M:
@@ -99,7 +101,7 @@ class LiveSource(ABC):
         heading_rad = last_heading_rad if math.isnan(heading_rad) else heading_rad
         # One assignment, so that the loop's thread never reads a part of two poses.
         self._pose[index] = x_m, y_m, z_m, heading_rad
-        self._arrived_ns[index], self._is_new[index] = now_ns, True
+        self._arrived_ns[index], self._has_pose[index], self._is_new[index] = now_ns, True, True
         self._received += 1
 
     def count(self, fault: str) -> None:
@@ -108,16 +110,18 @@ class LiveSource(ABC):
 
     def missing(self) -> list[str]:
         """Return the robots without a pose so far."""
-        pairs = zip(self.names, self._arrived_ns, strict=True)
-        return [name for name, arrived_ns in pairs if arrived_ns == NEVER_ARRIVED_NS]
+        return [name for name, has_pose in zip(self.names, self._has_pose, strict=True) if not has_pose]
 
-    def pop_new(self) -> SparseTable:
-        """Return the poses that are new since the last call, in slots x, y, z, heading; and count ages."""
+    def count_ages(self) -> None:
+        """Count the ages of the newest poses at a tick."""
         now_ns, max_age_ns = self._clock.now_ns(), to_ns(self.motion.max_age_s)
         for index, arrived_ns in enumerate(self._arrived_ns):
             age_ns = now_ns - arrived_ns
             self._longest_ns[index] = max(self._longest_ns[index], age_ns)
             self._silent[index] += age_ns > max_age_ns
+
+    def pop_new(self) -> SparseTable:
+        """Return the poses that are new since the last call, in slots x, y, z, heading."""
         new = [index for index, is_new in enumerate(self._is_new) if is_new]
         for index in new:
             self._is_new[index] = False
@@ -138,19 +142,22 @@ class LiveSource(ABC):
 def wait_for_poses(
     sources: Sequence[LiveSource], clock: Clock, report: Callable[[str], None], is_stopped: Callable[[], bool]
 ) -> None:
-    """Return when every robot has a pose, or when the run must end; BadInput if a robot has none in time.
+    """Return when every robot has a pose, `wait_s` of the sources has passed, or the run must end.
 
-    `report` prints what the run waits for.
+    BadInput for a source without any pose in time. `report` prints what the run waits for, and robots without a pose.
     """
     began_ns, reported = clock.now_ns(), ""
     while not is_stopped():
-        waiting = [source for source in sources if source.missing()]
-        if not waiting:
-            return
         now_ns = clock.now_ns()
-        for source in waiting:
-            if now_ns - began_ns > to_ns(source.motion.wait_s):
+        missing = [source for source in sources if source.missing()]
+        waiting = [source for source in missing if now_ns - began_ns <= to_ns(source.motion.wait_s)]
+        for source in missing:
+            if source not in waiting and len(source.missing()) == len(source.names):
                 raise _no_pose(source)
+        if not waiting:
+            for source in missing:
+                report(f"{source.address}: {_missing(source)}: they stay at their places")
+            return
         text = ", ".join(f"{source.address} ({_missing(source)})" for source in waiting)
         if text != reported:
             report(f"waits for the first poses from {text}")
@@ -161,22 +168,40 @@ def wait_for_poses(
 class FollowingBackend:
     """A backend in real time that adds the new poses of live sources to the actions of each tick."""
 
-    def __init__(self, backend: AgentBackend | TimedBackend, sources: Sequence[LiveSource]) -> None:
-        self._backend, self._sources = backend, sources
-        self.start, self.close = backend.start, backend.close
+    def __init__(
+        self,
+        backend: AgentBackend | TimedBackend,
+        sources: Sequence[LiveSource],
+        wait: Callable[[], None],
+        set_first_poses: Callable[[SparseTable], None],
+    ) -> None:
+        """`wait` returns when the first poses have arrived; `set_first_poses` places robots before tick 0."""
+        self._backend, self._sources, self._wait = backend, sources, wait
+        self._set_first_poses = set_first_poses
+        self._first = NOTHING_SET
+        self.close = backend.close
+
+    def start(self) -> None:
+        """Start the agents, and place the robots at their first poses; BadInput if a source has none in time."""
+        self._backend.start()
+        self._wait()
+        self._first = self._pop_new()
+        self._set_first_poses(self._first)
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """Return the actions of all robots in this tick, with new poses."""
-        return self._with_poses(self._backend.act(tick, readings, received, tx_status))
+        actions = self._backend.act(tick, readings, received, tx_status)
+        return self._with_poses(actions, self._pop_new() if tick else self._first)
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
         """Act as the wrapped backend, and add new poses."""
         timed = cast("TimedBackend", self._backend)
-        return self._with_poses(timed.act_in_time(tick, readings, received, tx_status, medium))
+        actions = timed.act_in_time(tick, readings, received, tx_status, medium)
+        return self._with_poses(actions, self._pop_new() if tick else self._first)
 
     def counts(self) -> dict[str, int]:
         """Return the numbers of faults of the backend and of the sources, by name."""
@@ -185,8 +210,13 @@ class FollowingBackend:
             counted.update(source.counts())
         return {**self._backend.counts(), **counted}
 
-    def _with_poses(self, actions: Actions) -> Actions:
-        return replace(actions, poses=SparseTable.joined([source.pop_new() for source in self._sources]))
+    def _pop_new(self) -> SparseTable:
+        return SparseTable.joined([source.pop_new() for source in self._sources])
+
+    def _with_poses(self, actions: Actions, poses: SparseTable) -> Actions:
+        for source in self._sources:
+            source.count_ages()
+        return replace(actions, poses=poses)
 
 
 def _missing(source: LiveSource) -> str:
@@ -196,6 +226,6 @@ def _missing(source: LiveSource) -> str:
 
 
 def _no_pose(source: LiveSource) -> BadInput:
-    expected = f"expected a pose of each robot within {source.motion.wait_s:g} s: {_missing(source)}"
+    expected = f"expected poses within {source.motion.wait_s:g} s: {_missing(source)}"
     faults = ", ".join(f"{count} {name}" for name, count in source.counts().items() if name != "ticks_without_pose")
     return BadInput(source.address, "", f"{expected}{f'; {faults}' if faults else ''}")

@@ -22,7 +22,7 @@ from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.base.sentinels import NO_TICK
 from swarmwire.comms.observe.interfaces import AgentBackend, SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.robot.tick_io import Actions, Readings
+from swarmwire.comms.robot.tick_io import NOTHING_SET, Actions, Readings, SparseTable
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import checked_array
 from swarmwire.comms.wire.tick_frames import decode_actions, encode_actions, sent_arrays, sent_of
@@ -145,6 +145,10 @@ class RecordedInputs:
         except BadFrame as fault:
             raise self._damaged(tick, fault) from None
 
+    def first_poses(self, robots: int) -> SparseTable:
+        """Return the poses of robots of live sources before tick 0, which are those of tick 0's actions."""
+        return self.actions(0, robots).poses if self.first_tick == 0 else NOTHING_SET
+
     def packets_within(self, tick: int, robots: int) -> list[SubtickPackets]:
         """Return the packets that came in the middle of a recorded tick, in order; BadInput for a damaged file."""
         frame = self._frame(tick - self.first_tick)
@@ -184,10 +188,23 @@ class RecordedInputs:
 class ReplayedBackend:
     """A backend whose actions are those of agents until the first recorded tick, then those of the record."""
 
-    def __init__(self, agents: AgentBackend, inputs: RecordedInputs, robots: int, rate_hz: int) -> None:
-        """`robots` is the number in all arenas."""
+    def __init__(
+        self,
+        agents: AgentBackend,
+        inputs: RecordedInputs,
+        robots: int,
+        rate_hz: int,
+        set_first_poses: Callable[[SparseTable], None],
+    ) -> None:
+        """`robots` is the number in all arenas; `set_first_poses` places robots of live sources before tick 0."""
         self._agents, self._inputs, self._robots, self._rate_hz = agents, inputs, robots, rate_hz
-        self.start, self.counts, self.close = agents.start, agents.counts, agents.close
+        self._set_first_poses = set_first_poses
+        self.counts, self.close = agents.counts, agents.close
+
+    def start(self) -> None:
+        """Start the agents, and place robots at their recorded first poses."""
+        self._agents.start()
+        self._set_first_poses(self._inputs.first_poses(self._robots))
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES

@@ -95,6 +95,11 @@ class DiscsEngine:
         """Set the states of the followed robots at the end of the next tick, (arenas, k, 6)."""
         self._end = end
 
+    def set_states(self, states: FloatArray) -> None:
+        """Set the states of the followed robots at once, (arenas, k, 6)."""
+        self.state[:, self._followed] = states
+        self._list_near(0.0)
+
     @property
     def _of_running(self) -> tuple[AnyArray, ...]:
         """The index of the followed robots of running arenas in `state`."""
