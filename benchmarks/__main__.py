@@ -18,7 +18,7 @@ from benchmarks.interfaces import interfaces, interfaces_start
 from benchmarks.learn import CASES as ENVIRONMENTS
 from benchmarks.learn import learn
 from benchmarks.metrics_share import metrics_share
-from benchmarks.motion import trace, udp
+from benchmarks.motion import trace, udp, udp_use
 from benchmarks.processes import BOID, processes
 from benchmarks.radio import CASES as AIRS
 from benchmarks.radio import air_cost, air_scaling, line_of_sight
@@ -58,6 +58,7 @@ OTHERS: dict[str, Callable[[str, int], None]] = {
     "interfaces-start-50": partial(interfaces_start, robots=50),
     "trace-1000": partial(trace, robots=1000, seconds=3600),
     "poses-udp-100": partial(udp, robots=100, rate_hz=50, seconds=10),
+    "poses-udp-use": partial(udp_use, robots=100, rate_hz=50, duration_s=10.0),
     "tls-cost": partial(tls_cost, robots=40, ticks=400),
     **dict.fromkeys(COMPILES, first_compile),
     "report-10000": partial(report_cost, seeds=200),

@@ -1,5 +1,7 @@
 """Robots that others move: what a trace costs, and what poses by UDP cost."""
 
+import os
+import socket
 import statistics
 import subprocess
 import sys
@@ -12,10 +14,10 @@ import numpy as np
 import polars as pl
 
 from benchmarks import scenes
-from benchmarks.lines import print_line, spread
+from benchmarks.lines import print_line, report, spread
 from benchmarks.robot_steps import D1
 from swarmwire.comms.base.clock import WallClock, to_s
-from swarmwire.deploy import run
+from swarmwire.deploy import Result, run
 from swarmwire.world.motion.traces.reading import read_trace
 from swarmwire.world.motion.traces.trace import TracePoses
 from swarmwire.world.motion.udp import UdpSource
@@ -23,6 +25,8 @@ from swarmwire.world.scenario.motion import UdpMotion
 from swarmwire.world.scenario_file import scenario_from
 
 RATE_HZ = 10
+SUBTICK_S = 0.001
+RANGE_M = 5.5  # of robots 1 m apart
 SIDE_M = 500.0
 # The program of another process that sends, like a simulator, at a steady rate of the wall clock.
 SENDER = """
@@ -71,12 +75,53 @@ def udp(name: str, repeats: int, *, robots: int, rate_hz: int, seconds: int) -> 
         sender = subprocess.Popen([sys.executable, "-c", text])
         while sender.poll() is None:
             clock.sleep_until(clock.now_ns() + 100_000_000)
-            source.pop_new()
+            source.pop_new(clock.now_ns())
         shares.append(100.0 * (time.process_time() - start_s) / to_s(clock.now_ns() - start_ns))
         source.close()
         received = source.report().received
     config = {"robots": robots, "rate_hz": rate_hz, "received": received, "sent": robots * rate_hz * seconds}
     print_line(name, statistics.median(shares), "% of a core", {**config, **spread(shares)})
+
+
+def udp_use(name: str, repeats: int, *, robots: int, rate_hz: int, duration_s: float) -> None:
+    """Wall time from the arrival of a pose by UDP to the start of the sub-tick whose radio uses it; p99 in ms.
+
+    The loop may compute this sub-tick later, by `tick_jitter_ms` at the start of a tick.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    group = {"body": "turtlebot4", "count": robots, "agent": "swarmwire.agent.behaviours:Consensus"}
+    mapping = {
+        "format": 1,
+        "name": name,
+        "duration_s": duration_s,
+        "arena": {"size_m": [SIDE_M, SIDE_M], "boundary": "open"},
+        "robots": {"r": {**group, "motion": {"source": "udp", "listen": f"127.0.0.1:{port}"}}},
+        "radio": {"range_m": RANGE_M},
+    }
+    scenario, results = scenario_from(mapping, name), list[Result]()
+    updates = int(rate_hz * (duration_s + 60.0))  # until the run ends
+    text = SENDER.format(updates=updates, rate_hz=rate_hz, robots=robots, port=port)
+    for _ in range(repeats):
+        sender = subprocess.Popen([sys.executable, "-c", text])
+        try:
+            results.append(run(scenario, realtime=1.0, subtick=SUBTICK_S))
+        finally:
+            sender.kill()
+            sender.wait()
+    values = [1000.0 * use.p99_s for result in results if (use := result.poses[0].use)]
+    use, real = results[-1].poses[0].use, results[-1].realtime
+    config = {
+        "subtick_s": SUBTICK_S,
+        "p50_ms": round(1000.0 * use.p50_s, 3) if use else None,
+        "worst_ms": round(1000.0 * use.worst_s, 3) if use else None,
+        "counted": use.count if use else 0,
+        "tick_jitter_ms": round(1000.0 * real.tick_jitter.p99_s, 3) if real and real.tick_jitter else None,
+        "load_average": round(os.getloadavg()[0], 1),  # a p99 of a millisecond is one of a quiet machine
+        **spread(values),
+    }
+    report(name, statistics.median(values), "ms", results[-1], config)
 
 
 def _write_walk(file: Path, robots: int, samples: int) -> None:

@@ -57,7 +57,7 @@ class AgentExecutor:
         """Return the robots' actions in this tick; AgentFailed with robot and traceback if an agent raises."""
         if self._waiting:
             # All robots of these groups: packets that wait for their dead robots are dropped here.
-            group_rows = [self._agent_groups[name].assignment.rows for name in readings]
+            group_rows = [NO_ROWS, *(self._agent_groups[name].assignment.rows for name in readings)]
             inbox, self._waiting = self._waiting.split(np.sort(np.concatenate(group_rows)))
             received, tx_status = Inbox(received, tx_status).followed_by(inbox) if inbox else (received, tx_status)
         parts = ((self._agent_groups[name], group_readings) for name, group_readings in readings.items())

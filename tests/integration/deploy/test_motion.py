@@ -128,7 +128,8 @@ def test_recorded_run_is_followed_bit_for_bit_and_the_second_run_needs_neither(t
     assert repeat(tmp_path / "again").same
 
 
-def test_udp_poses_decide_who_is_in_range_and_the_run_repeats_without_them(tmp_path):
+@pytest.mark.parametrize("subtick", [None, 0.001])
+def test_udp_poses_decide_who_is_in_range_and_the_run_repeats_without_them(tmp_path, subtick):
     port = free_port(socket.SOCK_DGRAM)
     path = scenario(tmp_path, "udp", f'listen = "127.0.0.1:{port}"')
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -150,13 +151,14 @@ def test_udp_poses_decide_who_is_in_range_and_the_run_repeats_without_them(tmp_p
         sender.sendto(b"{", ("127.0.0.1", port))
 
     with sender, sending(send):
-        result = run(path, realtime=1.0, out=tmp_path / "run", observers=[away])
+        result = run(path, realtime=1.0, subtick=subtick, out=tmp_path / "run", observers=[away])
     assert result.radio is not None
     assert result.radio.fates["received"] > 20
     assert result.radio.fates["out_of_range"] > 10
     assert result.counts["poses_of_unknown"] > 0
     assert result.counts["poses_malformed"] > 0
     assert result.poses[0].received > 20
+    assert result.poses[0].use
     assert set(result.poses[0].longest_gap_s) == {"row-0", "row-1"}
     assert RunFolder(tmp_path / "run").ticks()["x_m"].to_numpy()[0].tolist() == [0.0, 3.0]
     again = repeat(tmp_path / "run")

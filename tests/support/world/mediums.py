@@ -7,6 +7,7 @@ import numpy as np
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.observe.interfaces import SubtickPackets
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import SparseTable
 from tests.support.agent.hosts import MEASURES, received_from
 
 
@@ -25,6 +26,9 @@ class ScriptedMedium:
         assert packets.at_ns >= (self.times_ns or [0])[-1]
         if len(packets.sent):
             self.sent.append(packets)
+
+    def set_poses(self, at_ns: int, poses: SparseTable) -> None:
+        assert at_ns >= (self.times_ns or [0])[-1]
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         self.times_ns.append(until_ns)

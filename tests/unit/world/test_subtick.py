@@ -17,8 +17,8 @@ from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
-from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.robot.tick_io import Actions, Readings
+from swarmwire.comms.robot.packets import NO_TX_STATUSES, Fate, Payloads, ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
 from swarmwire.deploy.runs.scenario_parts import new_medium
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime_backend import PacedBackend
@@ -29,7 +29,7 @@ from swarmwire.world.world import World
 from tests.support.agent.hosts import MEASURES, assignment, group, one_group, spec
 from tests.support.agent.players import Word
 from tests.support.clocks import MS, ORIGIN_NS, FakeClock
-from tests.support.comms.radio import RADIOS, RATE_HZ, TICK_NS, make_medium, scattered
+from tests.support.comms.radio import IEEE_802_15_4, RADIOS, RATE_HZ, TICK_NS, make_medium, scattered
 from tests.support.world.mediums import ScriptedMedium
 from tests.support.world.scenes import SAMPLE
 
@@ -81,6 +81,22 @@ def test_packets_of_a_step_wait_for_their_slot_and_delay_no_others():
     medium.send(SubtickPackets(2 * MS, None, packet(0)))
     medium.send(SubtickPackets(60 * MS, 0, packet(2)))  # too late for its turn: at once
     assert received_at(medium.advance(100 * MS)[0]) == [(0, 2 * MS), (0, 50 * MS), (2, 60 * MS)]
+
+
+@pytest.mark.parametrize("radio", [Radio(99.0), IEEE_802_15_4], ids=["disk", "phy"])
+def test_packets_meet_the_poses_of_their_subtick(radio: Radio):
+    medium, pose = subtick_radio(radio, 2), np.zeros((2, 4))
+    pose[1, 0] = 9000.0  # out of range of both radios
+    medium.step(0, pose, None, None)
+    received_ms = list[int]()
+    for at_ms, x_m in ((10, None), (20, 9.0), (30, 9000.0)):
+        if x_m is not None:
+            medium.set_poses(at_ms * MS, SparseTable(np.array([1]), np.array([0]), np.array([x_m])))
+        medium.send(SubtickPackets(at_ms * MS, None, packet(0)))
+        received_ms += (medium.advance((at_ms + 9) * MS)[0].received_at_ns // MS).tolist()
+    results = medium.step(TICK_NS, pose, None, None)[0]
+    assert received_ms == [20]
+    assert results.tally.fates[0, [Fate.RECEIVED, Fate.OUT_OF_RANGE]].tolist() == [1, 2]
 
 
 def test_packets_whose_slot_is_ticks_later_are_sent_or_in_flight():

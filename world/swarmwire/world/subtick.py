@@ -5,6 +5,7 @@
     start of a tick   `step`       returns the results since the last tick, and received packets not yet delivered
     within the tick   `send`       packets of a step wait for their robot's send time, others are sent at once
                       `advance`    returns the packets received by then
+                      `set_poses`  poses of robots of live sources, for packets on air from then on
 
 The times of these calls do not change the course of a packet, so a run can be repeated from its inputs and their times.
 
@@ -18,6 +19,7 @@ from typing import Protocol
 
 import numpy as np
 
+from swarmwire.comms.base.angles import wrap_angles
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.clock import NEVER_NS, Clock, tick_start_ns, to_ns
 from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets
@@ -27,7 +29,10 @@ from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
+from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.world.backends.pacing import Pace
+
+HEADING, COLUMNS = 3, np.array([0, 1, 3, 2])  # slot of the heading, and the column of each slot in poses (rows, 4)
 
 
 class SubtickRadio:
@@ -43,6 +48,7 @@ class SubtickRadio:
         self._send_ns = np.empty(0, np.int64)  # (k,) send time; NEVER_NS: already sent
         self._next_ns = NEVER_NS  # the earliest send time
         self._now_ns = 0
+        self._pose: FloatArray = np.zeros((self._rows, 4))  # x, y in m, heading in rad, height in m
 
     def step(
         self, start_ns: int, pose: FloatArray, disruption: Disruption | None, radio: Radio | None
@@ -53,7 +59,7 @@ class SubtickRadio:
             The results of the medium, and the packets and transmit statuses among them that are not delivered yet.
         """
         self._release(start_ns)
-        self._now_ns = start_ns
+        self._now_ns, self._pose = start_ns, pose
         # Receptions up to now count also for robots that die now, as if delivered within the tick.
         undelivered = self._medium.advance(start_ns)
         return self._medium.step(start_ns, pose, disruption, radio), *undelivered
@@ -81,6 +87,15 @@ class SubtickRadio:
         self._release(until_ns)
         self._now_ns = until_ns
         return self._medium.advance(until_ns)
+
+    def set_poses(self, at_ns: int, poses: SparseTable) -> None:
+        """Set poses from `at_ns` on, in slots x, y, z, heading."""
+        self._now_ns = max(at_ns, self._now_ns)
+        self._release(self._now_ns)
+        pose, value = self._pose.copy(), np.where(poses.slot == HEADING, wrap_angles(poses.value), poses.value)
+        pose[poses.rows, COLUMNS[poses.slot]] = value
+        self._pose = pose  # the medium keeps the array
+        self._medium.set_poses(self._now_ns, pose)
 
     def leave(self, over: BoolArray) -> None:
         """Send the waiting packets of the arenas `over` (arenas,) now, so that the medium ends them."""

@@ -10,7 +10,7 @@ from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.robot.tick_io import Actions, Readings
+from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
 
 
 class AgentBackend(Protocol):
@@ -73,7 +73,7 @@ class SubtickPackets(NamedTuple):
 
 
 class SubtickMedium(Protocol):
-    """The radio medium during a tick, with the robots' poses at the tick's start."""
+    """The radio medium during a tick, with the robots' poses at the tick's start until `set_poses`."""
 
     def send(self, packets: SubtickPackets, /) -> None:
         """Accept packets; their times must lie within the tick and must not fall from call to call."""
@@ -81,6 +81,10 @@ class SubtickMedium(Protocol):
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """Advance to `until_ns`; return the packets received and the tx statuses since the last call."""
+        ...
+
+    def set_poses(self, at_ns: int, poses: SparseTable, /) -> None:
+        """Set poses of robots of live sources from `at_ns` on, in slots x, y, z, heading; see `send` for the times."""
         ...
 
 

@@ -52,7 +52,7 @@ class RadioMedium:
     A packet waits in its sender's queue, goes on air, and ends at each intended receiver in exactly one fate. Each tick
     is a `step` to its start, then a `send`. So a packet sent in a tick is received in the next tick at the earliest,
     under the poses of the tick in which it goes on air, or between these and the next ones if the radio's positions are
-    interpolated. `advance` and `send_at` divide a tick into sub-ticks.
+    interpolated. `advance`, `send_at` and `set_poses` divide a tick into sub-ticks.
 
     A fate becomes final
 
@@ -136,7 +136,7 @@ class RadioMedium:
         if len(liveness.history.alive) > 1:
             liveness.history.drop_unused(self._model.queued["epoch"])
         final = self._threads.start(partial(self._pop_final, start_ns), len(self._links))
-        self._set_poses(pose, radio or self.radio)
+        self._apply(pose, radio or self.radio)
         self._pose = pose
         edges = self._model.edges(pose, liveness.present) if self._computes_graph else results.NO_EDGES
         joined = final()
@@ -188,6 +188,11 @@ class RadioMedium:
             self._collect_final(until_ns)
         return received, tx_status
 
+    def set_poses(self, at_ns: int, pose: FloatArray) -> None:
+        """Let time pass within a tick to `at_ns`, and apply `pose` from then on, as `step` does."""
+        self._pass_time(at_ns)
+        self._model.set_poses(pose)
+
     def end(self) -> PacketCounts:
         """End the run: packets that are queued or under way end as IN_FLIGHT."""
         self._collect_final(self._reported_ns)
@@ -217,7 +222,7 @@ class RadioMedium:
         self._liveness.leave(ended)
         return counts
 
-    def _set_poses(self, pose: FloatArray, radio: Radio) -> None:
+    def _apply(self, pose: FloatArray, radio: Radio) -> None:
         """Apply these poses and parameters, and the pending disruption, from now on."""
         self._liveness.apply()
         if radio is not self.radio:

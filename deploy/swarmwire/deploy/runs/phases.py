@@ -11,6 +11,7 @@ from swarmwire.comms.base.clock import PreciseClock, WallClock, to_ns
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.comms.robot.messages import DICT_TAG, message_classes
+from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.deploy.machine import need_address_space, need_open_files, need_threads
 from swarmwire.deploy.runs.backends import (
     BackendSettings,
@@ -176,17 +177,15 @@ class PreparedRun:
     ) -> Loop:
         """Return the loop, without observers; actions that need not follow from the seed are recorded in the folder."""
         plan, replay = self.plan, self.plan.config.replay
-        acting = backend
+        acting, set_first_poses = backend, self.world.set_first_poses
+        subtick_ns = to_ns((plan.subtick_s or 0.0) * self.factor)
         if replay and replay.inputs:
-            acting = ReplayedBackend(
-                backend, replay.inputs, plan.robots, plan.static.rate_hz, self.world.set_first_poses
-            )
+            acting = ReplayedBackend(backend, replay.inputs, plan.robots, plan.static.rate_hz, set_first_poses)
+        if pose_sources and self.pace:
+            first_poses = partial(self._first_poses, pose_sources)
+            acting = FollowingBackend(acting, pose_sources, self.pace, subtick_ns, first_poses)
         if interfaces:
-            subtick_ns = to_ns((plan.subtick_s or 0.0) * self.factor)
             acting = InterfacesBackend(cast("TimedBackend", acting), interfaces.ports, subtick_ns)
-        if pose_sources:
-            wait = partial(wait_for_poses, pose_sources, self.clock, self.writer.report, self.is_stopped)
-            acting = FollowingBackend(acting, pose_sources, wait, self.world.set_first_poses)
         acting = self.writer.record_actions(acting, partial(self._has_external_actions, backend, log))
         return Loop(
             self.world,
@@ -199,6 +198,12 @@ class PreparedRun:
             timed=cast("TimedBackend", acting) if plan.recorded_subtick_s is not None else None,
             external_events=interfaces.follow if interfaces else None,
         )
+
+    def _first_poses(self, sources: Sequence[LiveSource]) -> SparseTable:
+        """Wait for the first poses of live sources, place the robots there, and return the poses."""
+        poses = wait_for_poses(sources, self.clock, self.writer.report, self.is_stopped)
+        self.world.set_first_poses(poses)
+        return poses
 
     def _has_external_actions(self, backend: AgentBackend, log: RunnerLog, tick: int) -> bool:
         """Return True if the actions of this tick need not follow from scenario and seed.

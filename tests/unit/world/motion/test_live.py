@@ -4,37 +4,28 @@ from functools import partial
 
 import pytest
 
+from swarmwire.comms.base.clock import NEVER_NS as FOREVER_NS
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
-from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
+from swarmwire.comms.robot.tick_io import Actions, Readings
+from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.motion.live import FollowingBackend, LiveSource, wait_for_poses
 from swarmwire.world.scenario.motion import UdpMotion
 from tests.support.clocks import FakeClock, StillClock
+from tests.support.world.poses import GivenPoses
 
 NAN = float("nan")
 
 
-class Given(LiveSource):
-    """A source whose poses the test puts."""
-
-    address = "given"
-
-    def open(self) -> None:
-        """Do nothing."""
-
-    def close(self) -> None:
-        """Do nothing."""
-
-
-def given(clock: FakeClock, **settings: float) -> Given:
+def given(clock: FakeClock, **settings: float) -> GivenPoses:
     motion = UdpMotion(source="udp").model_copy(update=settings)
-    return Given(motion, ["a-0", "a-1"], [4, 5], (10.0, 5.0), clock)
+    return GivenPoses(motion, ["a-0", "a-1"], [4, 5], (10.0, 5.0), clock)
 
 
 def poses(source: LiveSource) -> dict[int, dict[int, float]]:
     """New poses by row and slot."""
-    table = source.pop_new()
+    table = source.pop_new(FOREVER_NS)
     rows: dict[int, dict[int, float]] = {}
     for row, slot, value in zip(table.rows.tolist(), table.slot.tolist(), table.value.tolist(), strict=True):
         rows.setdefault(row, {})[slot] = value
@@ -132,9 +123,9 @@ class StandingAgents:
         return Actions.joined([])
 
 
-def test_first_poses_are_waited_for_placed_and_those_of_tick_0() -> None:
+def test_first_poses_are_waited_for_and_those_of_tick_0() -> None:
     clock = FakeClock()
-    source, lines, placed = given(clock), list[str](), list[SparseTable]()
+    source, lines = given(clock), list[str]()
     source.put("a-0", 1.0, 0.0, 0.0, 0.0)
 
     class PuttingClock(FakeClock):
@@ -143,13 +134,13 @@ def test_first_poses_are_waited_for_placed_and_those_of_tick_0() -> None:
             source.put("a-1", 2.0, 0.0, 0.0, 0.0)
 
     wait = partial(wait_for_poses, [source], PuttingClock(), lines.append, lambda: False)
-    backend = FollowingBackend(StandingAgents(), [source], wait, placed.append)
+    backend = FollowingBackend(StandingAgents(), [source], Pace(clock, 10, 1.0, lines.append), 0, wait)
     backend.start()
     assert len(lines) == 1
     assert "a-1" in lines[0]
     source.put("a-0", 1.05, 0.0, 0.0, 0.0)
     first, second = (backend.act(tick, {}, ReceivedPackets.none(), NO_TX_STATUSES).poses for tick in (0, 1))
-    assert placed[0].value.tolist() == first.value.tolist() == [1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0]
+    assert first.value.tolist() == [1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0]
     assert (second.rows.tolist(), second.value.tolist()) == ([4] * 4, [1.05, 0.0, 0.0, 0.0])
     assert backend.counts() == {"late": 3}
 

@@ -118,6 +118,11 @@ class Pace:
             return self._first_tick_ns
         return self._first_tick_ns + round((wall_ns - self._first_ns) * self.factor)
 
+    def wall_ns(self, simulated_ns: int) -> int:
+        """Return the wall time of a simulated time, by the present schedule; only after its first `begin`."""
+        assert self._first_ns is not None
+        return self._first_ns + round((simulated_ns - self._first_tick_ns) / self.factor)
+
     def end_ns(self, tick: int) -> int:
         """Return the wall time at which a tick ends."""
         first_ns = self.begin() + self._paused_ns if self._first_ns is None else self._first_ns

@@ -21,7 +21,7 @@ from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets, Ti
 from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.radio.send_times import keyed_ns
 from swarmwire.comms.robot.packets import TAG_BYTES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.robot.tick_io import Actions, Readings
+from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
 from swarmwire.world.backends.pacing import LatencyHistogram, LatencySummary, Pace
 from swarmwire.world.interfaces.namespaces import RobotInterface
 from swarmwire.world.interfaces.programs import robot_event
@@ -263,3 +263,8 @@ class _MediumWithFrames:
         self._frames.send_waiting(self._medium, until_ns)
         received, tx_status = self._medium.advance(until_ns)
         return self._frames.exchange(received, until_ns), tx_status
+
+    def set_poses(self, at_ns: int, poses: SparseTable) -> None:
+        """Set poses, after the frames that are due before them."""
+        self._frames.send_waiting(self._medium, at_ns)
+        self._medium.set_poses(at_ns, poses)

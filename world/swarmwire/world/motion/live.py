@@ -1,6 +1,7 @@
 """Live sources: the newest pose of each robot as it arrives, and a backend that adds new poses to a tick's actions.
 
 Robots are at their first poses before tick 0, whose actions have these; later actions have the poses that arrived.
+With sub-ticks the radio medium gets them at the start of each sub-tick, the world at the end of the tick.
 """
 
 import math
@@ -13,11 +14,12 @@ from typing import cast
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.base.clock import Clock, to_ns, to_s
+from swarmwire.comms.base.clock import Clock, tick_start_ns, to_ns, to_s
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.interfaces import AgentBackend, SubtickMedium, TimedBackend
+from swarmwire.comms.observe.interfaces import AgentBackend, SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import NOTHING_SET, Actions, Readings, SparseTable
+from swarmwire.world.backends.pacing import LatencyHistogram, LatencySummary, Pace
 from swarmwire.world.scenario.motion import LiveMotion
 
 POLL_NS = to_ns(0.02)  # interval of polls for the first poses
@@ -30,6 +32,7 @@ class PosesReport:
 
     source: str  #: its address
     received: int  #: usable poses
+    use: LatencySummary | None  #: wall time from the arrival of a pose to its use, by the radio or at a tick's end
     longest_gap_s: dict[str, float]  #: by robot: the greatest age of its newest pose at a tick, wall time
     silent_ticks: dict[str, int]  #: by robot, if any: ticks at which its newest pose was older than `max_age_s`
 
@@ -67,6 +70,7 @@ class LiveSource(ABC):
         self._arrived_ns = [clock.now_ns()] * len(names)  # without a pose: the age counts from now
         self._has_pose, self._is_new = [False] * len(names), [False] * len(names)
         self._counted = Counter[str]()
+        self._use = LatencyHistogram()
         self._received, self._longest_ns, self._silent = 0, [0] * len(names), [0] * len(names)
 
     @abstractmethod
@@ -112,6 +116,11 @@ class LiveSource(ABC):
         """Return the robots without a pose so far."""
         return [name for name, has_pose in zip(self.names, self._has_pose, strict=True) if not has_pose]
 
+    def pop_first(self) -> SparseTable:
+        """Return the poses before tick 0, as `pop_new`; their wait for the other robots' is no delay."""
+        poses, self._use = self.pop_new(self._clock.now_ns()), LatencyHistogram()
+        return poses
+
     def count_ages(self) -> None:
         """Count the ages of the newest poses at a tick."""
         now_ns, max_age_ns = self._clock.now_ns(), to_ns(self.motion.max_age_s)
@@ -120,11 +129,14 @@ class LiveSource(ABC):
             self._longest_ns[index] = max(self._longest_ns[index], age_ns)
             self._silent[index] += age_ns > max_age_ns
 
-    def pop_new(self) -> SparseTable:
-        """Return the poses that are new since the last call, in slots x, y, z, heading."""
-        new = [index for index, is_new in enumerate(self._is_new) if is_new]
+    def pop_new(self, by_ns: int) -> SparseTable:
+        """Return poses that are new since the last call and arrived by this wall time, in slots x, y, z, heading."""
+        new = [index for index, is_new in enumerate(self._is_new) if is_new and self._arrived_ns[index] <= by_ns]
+        if not new:
+            return NOTHING_SET
         for index in new:
             self._is_new[index] = False
+        self._use.add(np.array([by_ns - self._arrived_ns[index] for index in new]))
         return SparseTable.from_dense(self._rows[new], self._pose[new])
 
     def counts(self) -> dict[str, int]:
@@ -136,13 +148,13 @@ class LiveSource(ABC):
         """Return the report so far."""
         gaps_s = dict(zip(self.names, map(to_s, self._longest_ns), strict=True))
         silent = {name: ticks for name, ticks in zip(self.names, self._silent, strict=True) if ticks}
-        return PosesReport(self.address, self._received, gaps_s, silent)
+        return PosesReport(self.address, self._received, self._use.summary(), gaps_s, silent)
 
 
 def wait_for_poses(
     sources: Sequence[LiveSource], clock: Clock, report: Callable[[str], None], is_stopped: Callable[[], bool]
-) -> None:
-    """Return when every robot has a pose, `wait_s` of the sources has passed, or the run must end.
+) -> SparseTable:
+    """Return the first poses when every robot has one, `wait_s` of the sources has passed, or the run must end.
 
     BadInput for a source without any pose in time. `report` prints what the run waits for, and robots without a pose.
     """
@@ -157,12 +169,13 @@ def wait_for_poses(
         if not waiting:
             for source in missing:
                 report(f"{source.address}: {_missing(source)}: they stay at their places")
-            return
+            break
         text = ", ".join(f"{source.address} ({_missing(source)})" for source in waiting)
         if text != reported:
             report(f"waits for the first poses from {text}")
             reported = text
         clock.sleep_until(now_ns + POLL_NS)
+    return SparseTable.joined([source.pop_first() for source in sources])
 
 
 class FollowingBackend:
@@ -172,36 +185,40 @@ class FollowingBackend:
         self,
         backend: AgentBackend | TimedBackend,
         sources: Sequence[LiveSource],
-        wait: Callable[[], None],
-        set_first_poses: Callable[[SparseTable], None],
+        pace: Pace,
+        subtick_ns: int,
+        first_poses: Callable[[], SparseTable],
     ) -> None:
-        """`wait` returns when the first poses have arrived; `set_first_poses` places robots before tick 0."""
-        self._backend, self._sources, self._wait = backend, sources, wait
-        self._set_first_poses = set_first_poses
-        self._first = NOTHING_SET
+        """`first_poses` waits for the first poses, places the robots there, and returns the poses.
+
+        `subtick_ns` is the length of a sub-tick in simulated time.
+        """
+        self._backend, self._sources, self._pace, self._subtick_ns = backend, sources, pace, subtick_ns
+        self._first_poses, self._first = first_poses, NOTHING_SET
         self.close = backend.close
 
     def start(self) -> None:
         """Start the agents, and place the robots at their first poses; BadInput if a source has none in time."""
         self._backend.start()
-        self._wait()
-        self._first = self._pop_new()
-        self._set_first_poses(self._first)
+        self._first = self._first_poses()
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """Return the actions of all robots in this tick, with new poses."""
         actions = self._backend.act(tick, readings, received, tx_status)
-        return self._with_poses(actions, self._pop_new() if tick else self._first)
+        return self._with_poses(actions, self._pop_new(self._pace.now_ns()) if tick else self._first)
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
         """Act as the wrapped backend, and add new poses."""
         timed = cast("TimedBackend", self._backend)
-        actions = timed.act_in_time(tick, readings, received, tx_status, medium)
-        return self._with_poses(actions, self._pop_new() if tick else self._first)
+        start_ns, end_ns = (tick_start_ns(number, self._pace.rate_hz) for number in (tick, tick + 1))
+        followed = _FollowedMedium(medium, start_ns, self._subtick_ns, self._pop_by)
+        actions = timed.act_in_time(tick, readings, received, tx_status, followed)
+        followed.set_new(end_ns)
+        return self._with_poses(actions, SparseTable.joined([NOTHING_SET if tick else self._first, *followed.poses]))
 
     def counts(self) -> dict[str, int]:
         """Return the numbers of faults of the backend and of the sources, by name."""
@@ -210,13 +227,53 @@ class FollowingBackend:
             counted.update(source.counts())
         return {**self._backend.counts(), **counted}
 
-    def _pop_new(self) -> SparseTable:
-        return SparseTable.joined([source.pop_new() for source in self._sources])
+    def _pop_new(self, by_ns: int) -> SparseTable:
+        return SparseTable.joined([source.pop_new(by_ns) for source in self._sources])
+
+    def _pop_by(self, at_ns: int) -> SparseTable:
+        return self._pop_new(self._pace.wall_ns(at_ns))
 
     def _with_poses(self, actions: Actions, poses: SparseTable) -> Actions:
         for source in self._sources:
             source.count_ages()
         return replace(actions, poses=poses)
+
+
+class _FollowedMedium:
+    """A medium that gets new poses at the start of each sub-tick, also if the loop comes to it later.
+
+    Attributes:
+        poses: those that it got, in order.
+    """
+
+    def __init__(
+        self, medium: SubtickMedium, start_ns: int, subtick_ns: int, pop_by: Callable[[int], SparseTable]
+    ) -> None:
+        """`pop_by` returns the poses that arrived by a simulated time."""
+        self._medium, self._next_ns, self._subtick_ns, self._pop_by = medium, start_ns, subtick_ns, pop_by
+        self.poses: list[SparseTable] = []
+        self.set_poses = medium.set_poses
+
+    def send(self, packets: SubtickPackets) -> None:
+        """Send packets, under the poses of their sub-tick."""
+        self._set_due(packets.at_ns)
+        self._medium.send(packets)
+
+    def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
+        """Advance the medium, under the poses of each sub-tick."""
+        self._set_due(until_ns)
+        return self._medium.advance(until_ns)
+
+    def set_new(self, at_ns: int) -> None:
+        """Set the poses that arrived by `at_ns`."""
+        if len(poses := self._pop_by(at_ns)):
+            self._medium.set_poses(at_ns, poses)
+            self.poses.append(poses)
+
+    def _set_due(self, until_ns: int) -> None:
+        while self._next_ns <= until_ns:
+            self.set_new(self._next_ns)
+            self._next_ns += self._subtick_ns
 
 
 def _missing(source: LiveSource) -> str:

@@ -17,6 +17,7 @@ from swarmwire.world.interfaces.programs import ENDED
 if TYPE_CHECKING:
     from swarmwire.metrics.measures.metric import Metric
     from swarmwire.world.backends.pacing import LatencySummary
+    from swarmwire.world.motion.live import PosesReport
 
 BLOCKED = Fate.BLOCKED.name.lower()
 MAX_SHOWN = 6  # arenas in a line
@@ -126,6 +127,12 @@ def _real_time_rows(result: Result) -> Iterator[tuple[str, str]]:
         yield "ticks began late", _delays(real.tick_jitter)
     if real.delivery:
         yield "delivered late", f"{_delays(real.delivery)} of {real.delivery.count} packets"
+    for poses in result.poses:
+        yield "poses", f"{poses.received} from {poses.source}"
+        if poses.use:
+            yield "poses used late", _delays(poses.use)
+        robot, gap_s = max(poses.longest_gap_s.items(), key=lambda pair: pair[1])
+        yield "longest gap", f"{gap_s:.2f} s without a pose of {robot}{_silent(poses)}"
     if frames := result.interfaces:
         yield "interfaces", f"{frames.sent} frames sent, {frames.delivered} delivered, {frames.late} late"
         if frames.delivery:
@@ -137,6 +144,11 @@ def _real_time_rows(result: Result) -> Iterator[tuple[str, str]]:
         late, stops = sum(real.late_answers.values()), sum(real.watchdog_stops.values())
         drops = f"{real.frames_dropped} frames with {real.packets_dropped} packets dropped"
         yield "runners", f"{late} late answers (per robot), {stops} watchdog stops, {drops}"
+
+
+def _silent(poses: "PosesReport") -> str:
+    silent = [f"{robot} ({ticks} ticks)" for robot, ticks in poses.silent_ticks.items()]
+    return f"; silent: {abbreviate(silent, MAX_SHOWN)}" if silent else ""
 
 
 def _delays(latency: "LatencySummary") -> str:

@@ -4,15 +4,16 @@ In lockstep all actions follow from scenario and seed until a runner is lost, or
 runners in real time no actions do, since they depend on when an answer comes. From the first such tick on, each tick's
 actions are appended to `inputs/actions.frames`: a length of 4 bytes, little-endian, and an `actions` frame of the wire.
 In real time with a sub-tick, where packets come in the middle of a tick, the frame also has the time of each packet,
-and whether it waits for its robot's turn (`within`). Each frame is one write, so that a killed run keeps all its ticks;
-a frame that is cut off at the end of the file is ignored.
+and whether it waits for its robot's turn (`within`). The poses of live sources are in the actions; with a sub-tick the
+frame has the times at which the radio medium got them, and their place among the packets (`within/poses`). Each frame
+is one write, so that a killed run keeps all its ticks; a frame that is cut off at the end of the file is ignored.
 """
 
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from swarmwire.metrics.records.run_folder.layout import INPUTS
 
 LENGTH_BYTES = 4
 WITHIN = "within/"  # array of the packets that came within the tick; also the prefix of the packets' arrays
+POSES_WITHIN = "within/poses"  # array of the poses that came within the tick, which are the last of the actions' poses
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,14 @@ class InputsRecord:
     first_tick: int  #: first recorded tick; actions before it follow from scenario and seed
     ticks: int  #: number of ticks from the first recorded one to the end of the run
     ticks_not_recorded: int  #: number of ticks that could not be written, as on a full disk
+
+
+class PosesWithin(NamedTuple):
+    """Poses of robots of live sources that came in the middle of a tick."""
+
+    at_ns: int  # simulated time from which the radio medium used them
+    packets: int  # number of batches of packets that came before them in the tick
+    poses: SparseTable
 
 
 class RecordedBackend:
@@ -69,7 +79,7 @@ class RecordedBackend:
         recorded = _RecordedMedium(medium)
         actions = cast("TimedBackend", self._backend).act_in_time(tick, readings, received, tx_status, recorded)
         if self._first_tick is not None or self._is_external(tick):
-            self._record(tick, actions, _packet_arrays(recorded.packets))
+            self._record(tick, actions, _packet_arrays(recorded.packets) | _pose_arrays(recorded.poses))
         return actions
 
     def record(self) -> InputsRecord | None:
@@ -146,8 +156,28 @@ class RecordedInputs:
             raise self._damaged(tick, fault) from None
 
     def first_poses(self, robots: int) -> SparseTable:
-        """Return the poses of robots of live sources before tick 0, which are those of tick 0's actions."""
-        return self.actions(0, robots).poses if self.first_tick == 0 else NOTHING_SET
+        """Return the poses of robots of live sources before tick 0: those of its actions that came not within it."""
+        if self.first_tick != 0:
+            return NOTHING_SET
+        poses = self.actions(0, robots).poses
+        return poses.select(np.arange(len(poses) - sum(len(part.poses) for part in self.poses_within(0, poses))))
+
+    def poses_within(self, tick: int, poses: SparseTable) -> list["PosesWithin"]:
+        """Return the parts of a tick's `poses` that came in the middle of it, in order; BadInput for a damaged file."""
+        frame = self._frame(tick - self.first_tick)
+        if POSES_WITHIN not in frame.arrays:
+            return []
+        try:
+            at_ns, packets, count = checked_array(frame, POSES_WITHIN, "<i8", (3, None))
+            end: IntArray = len(poses) - count.sum() + np.cumsum(count)
+            if (count < 1).any() or count.sum() > len(poses) or (packets[1:] < packets[:-1]).any():
+                raise BadFrame("malformed", "within/poses: expected poses in the order in which they came")
+        except BadFrame as fault:
+            raise self._damaged(tick, fault) from None
+        return [
+            PosesWithin(int(at_ns[i]), int(packets[i]), poses.select(np.arange(int(end[i] - count[i]), int(end[i]))))
+            for i in range(len(count))
+        ]
 
     def packets_within(self, tick: int, robots: int) -> list[SubtickPackets]:
         """Return the packets that came in the middle of a recorded tick, in order; BadInput for a damaged file."""
@@ -217,19 +247,27 @@ class ReplayedBackend:
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
     ) -> Actions:
-        """Return the recorded actions, and send the packets at their times; receptions are in the record."""
-        for packets in self._inputs.packets_within(tick, self._robots):
-            medium.send(packets)
+        """Return the recorded actions; send packets and set poses at their times. Receptions are in the record."""
+        actions, sent = self._inputs.actions(tick, self._robots), 0
+        packets = self._inputs.packets_within(tick, self._robots)
+        for part in self._inputs.poses_within(tick, actions.poses):
+            for batch in packets[sent : part.packets]:
+                medium.send(batch)
+            medium.set_poses(part.at_ns, part.poses)
+            sent = part.packets
+        for batch in packets[sent:]:
+            medium.send(batch)
         medium.advance(tick_start_ns(tick + 1, self._rate_hz))  # the run does this also in its last tick
-        return self._inputs.actions(tick, self._robots)
+        return actions
 
 
 class _RecordedMedium:
-    """A medium and the packets that were sent on it."""
+    """A medium, the packets that were sent on it, and the poses that it got."""
 
     def __init__(self, medium: SubtickMedium) -> None:
         self._medium = medium
         self.packets: list[SubtickPackets] = []
+        self.poses: list[PosesWithin] = []
         self.advance = medium.advance
 
     def send(self, packets: SubtickPackets) -> None:
@@ -237,6 +275,11 @@ class _RecordedMedium:
         self._medium.send(packets)
         if len(packets.sent):
             self.packets.append(packets)
+
+    def set_poses(self, at_ns: int, poses: SparseTable) -> None:
+        """Set and record poses."""
+        self._medium.set_poses(at_ns, poses)
+        self.poses.append(PosesWithin(at_ns, len(self.packets), poses))
 
 
 def _packet_arrays(batches: Sequence[SubtickPackets]) -> dict[str, AnyArray]:
@@ -246,6 +289,12 @@ def _packet_arrays(batches: Sequence[SubtickPackets]) -> dict[str, AnyArray]:
     rows = [(batch.at_ns, NO_TICK if batch.tick is None else batch.tick, len(batch.sent)) for batch in batches]
     packets = sent_arrays(SentPackets.joined([batch.sent for batch in batches]))
     return {WITHIN: np.array(rows).T.copy(), **{f"{WITHIN}{name}": array for name, array in packets.items()}}
+
+
+def _pose_arrays(parts: Sequence[PosesWithin]) -> dict[str, AnyArray]:
+    """Return the times of poses that came within a tick, which are the last of its actions' poses, as an array."""
+    rows = [(part.at_ns, part.packets, len(part.poses)) for part in parts]
+    return {POSES_WITHIN: np.array(rows).T.copy()} if rows else {}
 
 
 def recorded_inputs(folder: Path) -> RecordedInputs | None:

@@ -267,10 +267,14 @@ def _poses(source: dict[str, Any]) -> ReportTable:
         for robot, gap_s in sorted(gaps_s.items(), key=lambda pair: -pair[1])
     )
     caption = (
-        f"Poses from {source['source']}: {source['received']:,} were used. The gap is the greatest age of a robot's "
-        "newest pose at a tick, in wall time; silent are ticks at which it was older than `max_age_s`."
+        f"Poses from {source['source']}: {source['received']:,} were used{_after(source['use'])}. "
+        "The gap is the greatest age of a robot's newest pose at a tick, in wall time; silent are ticks at which it was older than `max_age_s`."
     )
     return ReportTable(("robot", "longest gap in s", "silent ticks"), rows, caption, folded=len(rows) > _MAX_ROBOTS)
+
+
+def _after(use: dict[str, Any] | None) -> str:
+    return f", 99 % of them within {number(1e3 * use['p99_s'])} ms of their arrival" if use else ""
 
 
 def _delay_cells(delay: dict[str, Any]) -> tuple[str, ...]:
