@@ -8,7 +8,7 @@ from typing import Any, get_args
 import pytest
 import zenoh
 
-from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.clock import NEVER_NS, WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.ros2.links import close, open_client, open_router
 from swarmwire.comms.protocols.ros2.messages import DISTROS
@@ -75,7 +75,7 @@ def publish(node: zenoh.Session, topic: str, message: Any, payload: bytes | None
 
 def rows_of(source: Ros2Source) -> dict[int, list[float]]:
     """New poses by row."""
-    table, rows = source.pop_new(), dict[int, list[float]]()
+    table, rows = source.pop_new(NEVER_NS), dict[int, list[float]]()
     for row, value in zip(table.rows.tolist(), table.value.tolist(), strict=True):
         rows.setdefault(row, []).append(value)
     return rows
@@ -133,6 +133,16 @@ def test_poses_of_a_shared_tf_are_told_apart_by_frame(settings, frames):
         until(lambda: (publish(node, "tf", transforms(*frames)), not source.missing())[1])
         assert rows_of(source) == EXPECTED
         assert source.counts() == {}
+
+
+def test_stamps_of_headers_order_the_poses():
+    source = source_of(type=POSE, stamps=True)
+    with opened(source) as node:
+        until_all_have_poses(source, lambda index, x_m: publish(node, f"flock_{index}/pose", stamped(x_m)))
+        older = independent.PoseStamped(independent.header(4, "map"), pose(1.05))
+        publish(node, "flock_0/pose", older)
+        assert until(source.counts) == {"poses_late": 1}
+        assert rows_of(source) == EXPECTED
 
 
 def test_tf_topic_of_each_robot_may_have_equal_frames():

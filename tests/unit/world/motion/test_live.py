@@ -1,18 +1,21 @@
 """Poses as they arrive: which are used, which are counted, and how old they are."""
 
+import socket
+from contextlib import closing
 from functools import partial
 
 import pytest
 
 from swarmwire.comms.base.clock import NEVER_NS as FOREVER_NS
-from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.robot.tick_io import Actions, Readings
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.motion.live import FollowingBackend, LiveSource, wait_for_poses
+from swarmwire.world.motion.udp import UdpSource
 from swarmwire.world.scenario.motion import UdpMotion
-from tests.support.clocks import FakeClock, StillClock
+from tests.support.clocks import FakeClock, StillClock, until
 from tests.support.world.poses import GivenPoses
 
 NAN = float("nan")
@@ -90,6 +93,32 @@ def test_jump_counts_also_in_height() -> None:
     source.put("a-0", 0.0, 0.0, 9.0, 0.0)
     assert poses(source)[4][2] == 1.0
     assert source.counts() == {"poses_jumped": 1}
+
+
+def test_stamps_order_poses_and_time_jumps_in_place_of_their_arrival() -> None:
+    clock = FakeClock()
+    source = given(clock, max_speed_mps=2.0, stamps=True)
+    source.put("a-0", 0.0, 0.0, 0.0, 0.0, 5 * NS_PER_S)
+    source.put("a-0", 3.0, 0.0, 0.0, 0.0, 7 * NS_PER_S)  # 1.5 m/s by the stamps; both arrive at once
+    source.put("a-0", 1.0, 0.0, 0.0, 0.0, 6 * NS_PER_S)
+    clock.time_ns += 60 * NS_PER_S
+    source.put("a-0", 6.0, 0.0, 0.0, 0.0, 8 * NS_PER_S)  # 3 m/s by the stamps
+    source.put("a-0", 3.0, 0.0, 0.0, 0.0)
+    assert poses(source)[4][0] == 3.0
+    assert source.counts() == {"poses_late": 1, "poses_jumped": 1, "poses_malformed": 1}
+
+
+def test_stamp_of_a_datagram_is_its_t_s() -> None:
+    motion = UdpMotion(source="udp", listen="127.0.0.1:0", stamps=True)
+    source = UdpSource(motion, ["a-0"], [0], (10.0, 5.0), WallClock())
+    source.open()
+    with closing(source), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for stamp in ('"t_s": 2', '"t_s": 1.5', '"t_s": 2.5', '"heading_rad": 0'):
+            message = f'{{"robot": "a-0", "x_m": 1, "y_m": 0, {stamp}}}'
+            sender.sendto(message.encode(), ("127.0.0.1", int(source.address.rpartition(":")[2])))
+        until(lambda: source.counts().get("poses_malformed"))
+    assert source.counts() == {"poses_late": 1, "poses_malformed": 1}
+    assert source.report().received == 2
 
 
 def test_age_beyond_the_limit_counts_ticks_and_shows_in_the_report() -> None:

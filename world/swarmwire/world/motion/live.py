@@ -40,9 +40,9 @@ class PosesReport:
 class LiveSource(ABC):
     """The poses of one group's robots as they arrive; `put` may be called from any thread.
 
-    A pose is ignored, and counted, if it is malformed, of an unknown robot, outside the arena, or a jump: farther from
-    the last one than `max_speed_mps` allows in the time between. After a jump that was none the next poses are used as
-    soon as this time has passed.
+    A pose is ignored, and counted, if it is malformed, of an unknown robot, outside the arena, late (with `stamps`), or
+    a jump: farther from the last one than `max_speed_mps` allows in the time between. After a jump that was none the
+    next poses are used as soon as this time has passed.
 
     Attributes:
         address: where poses arrive; known from `open` on.
@@ -68,6 +68,7 @@ class LiveSource(ABC):
         self._half_m, self._clock = half_m, clock
         self._pose: FloatArray = np.full((len(names), 4), np.nan)  # x, y, z in m, heading in rad
         self._arrived_ns = [clock.now_ns()] * len(names)  # without a pose: the age counts from now
+        self._timed_ns = [0] * len(names)  # stamps of the last poses, or their arrivals
         self._has_pose, self._is_new = [False] * len(names), [False] * len(names)
         self._counted = Counter[str]()
         self._use = LatencyHistogram()
@@ -81,31 +82,43 @@ class LiveSource(ABC):
     def close(self) -> None:
         """Stop receiving; safe to call more than once."""
 
-    def put(self, name: str, x_m: float, y_m: float, z_m: float, heading_rad: float) -> None:
-        """Take a pose that arrived now; z and heading are NaN if the source does not give them: they stay."""
-        index = self._index_of.get(name)
+    def put(
+        self, name: str, x_m: float, y_m: float, z_m: float, heading_rad: float, stamp_ns: int | None = None
+    ) -> None:
+        """Take a pose that arrived now; z and heading are NaN if the source does not give them: they stay.
+
+        `stamp_ns` is the time in its message, of any clock; None: it has none.
+        """
+        index, now_ns = self._index_of.get(name), self._clock.now_ns()
+        timed_ns, is_finite = stamp_ns if self.motion.stamps else now_ns, math.isfinite(x_m) and math.isfinite(y_m)
         if index is None:
             self._counted["poses_of_unknown"] += 1
-        elif not (math.isfinite(x_m) and math.isfinite(y_m)) or math.isinf(z_m) or math.isinf(heading_rad):
+        elif timed_ns is None or not is_finite or math.isinf(z_m) or math.isinf(heading_rad):
             self._counted["poses_malformed"] += 1
         elif abs(x_m) > self._half_m[0] or abs(y_m) > self._half_m[1]:
             self._counted["poses_outside"] += 1
         else:
-            self._keep(index, x_m, y_m, z_m, heading_rad)
+            self._keep(index, (x_m, y_m, z_m, heading_rad), now_ns, timed_ns)
 
-    def _keep(self, index: int, x_m: float, y_m: float, z_m: float, heading_rad: float) -> None:
-        now_ns, (last_x_m, last_y_m, last_z_m, last_heading_rad) = self._clock.now_ns(), self._pose[index].tolist()
+    def _keep(self, index: int, pose: tuple[float, float, float, float], now_ns: int, timed_ns: int) -> None:
+        """Use a pose, unless it is late or a jump by `timed_ns`: its stamp, or its arrival `now_ns`."""
+        x_m, y_m, z_m, heading_rad = pose
+        last_x_m, last_y_m, last_z_m, last_heading_rad = self._pose[index].tolist()
         z_m = last_z_m if math.isnan(z_m) else z_m
         if self._has_pose[index]:
             climb_m = 0.0 if math.isnan(last_z_m) else z_m - last_z_m
             away_m = math.hypot(x_m - last_x_m, y_m - last_y_m, climb_m)
-            if away_m > self.motion.max_speed_mps * to_s(now_ns - self._arrived_ns[index]) + POSITION_NOISE_M:
+            if timed_ns < self._timed_ns[index]:
+                self._counted["poses_late"] += 1
+                return
+            if away_m > self.motion.max_speed_mps * to_s(timed_ns - self._timed_ns[index]) + POSITION_NOISE_M:
                 self._counted["poses_jumped"] += 1
                 return
         heading_rad = last_heading_rad if math.isnan(heading_rad) else heading_rad
         # One assignment, so that the loop's thread never reads a part of two poses.
         self._pose[index] = x_m, y_m, z_m, heading_rad
-        self._arrived_ns[index], self._has_pose[index], self._is_new[index] = now_ns, True, True
+        self._arrived_ns[index], self._timed_ns[index] = now_ns, timed_ns
+        self._has_pose[index] = self._is_new[index] = True
         self._received += 1
 
     def count(self, fault: str) -> None:

@@ -18,7 +18,7 @@ from swarmwire.world.scenario.motion import MavlinkMotion
 AUTOPILOT = 1  # MAV_COMP_ID_AUTOPILOT1
 MAX_SYSTEM = 255
 UNKNOWN_HEADING = 65_535  # `hdg` of GLOBAL_POSITION_INT
-UNITS_PER_DEG, MM_PER_M, UNITS_PER_HDG_DEG = 1e7, 1e3, 100.0
+UNITS_PER_DEG, MM_PER_M, UNITS_PER_HDG_DEG, NS_PER_MS = 1e7, 1e3, 100.0, 1_000_000
 BAD_DATA = "BAD_DATA"  # pymavlink's type of bytes that are no message
 
 
@@ -57,12 +57,13 @@ class MavlinkSource(DatagramSource):
         if kind == "ATTITUDE":
             self._yaw_rad[system] = message.yaw
         elif kind == "LOCAL_POSITION_NED" and origin is None:
-            self.put(name, message.y, message.x, -message.z, _heading_rad(self._yaw_rad.get(system, nan)))
+            heading_rad = _heading_rad(self._yaw_rad.get(system, nan))
+            self.put(name, message.y, message.x, -message.z, heading_rad, NS_PER_MS * message.time_boot_ms)
         elif kind == "GLOBAL_POSITION_INT" and origin is not None:
             point = Geodetic(message.lat / UNITS_PER_DEG, message.lon / UNITS_PER_DEG, message.alt / MM_PER_M)
             east_m, north_m, up_m = map(float, to_local(point, Geodetic(*origin)))
             yaw_rad = nan if message.hdg == UNKNOWN_HEADING else radians(message.hdg / UNITS_PER_HDG_DEG)
-            self.put(name, east_m, north_m, up_m, _heading_rad(yaw_rad))
+            self.put(name, east_m, north_m, up_m, _heading_rad(yaw_rad), NS_PER_MS * message.time_boot_ms)
 
 
 def _heading_rad(yaw_rad: float) -> float:

@@ -6,6 +6,7 @@ from typing import Any
 
 import zenoh
 
+from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.protocols.ros2.keys import (
     ODOMETRY,
@@ -32,7 +33,7 @@ CONNECT_S = 1.0  # duration of an attempt to connect, which delays the end of a 
 
 
 class Ros2Source(LiveSource):
-    """Subscribes to the topics of the group's robots at each endpoint; the age of a pose counts from its arrival."""
+    """Subscribes to the topics of the group's robots at each endpoint."""
 
     motion: Ros2Motion
 
@@ -131,7 +132,9 @@ class Ros2Source(LiveSource):
         for part in poses_of(self.motion.type, message):
             if name := name_of.get(part.name):  # other transforms are those of wheels, sensors and other robots
                 try:
-                    self.put(name, *space_pose(part.position, part.orientation))
+                    stamp = part.header.stamp
+                    stamp_ns = stamp.sec * NS_PER_S + stamp.nanosec
+                    self.put(name, *space_pose(part.position, part.orientation), stamp_ns)
                 except BadFrame:
                     self.count("poses_malformed")
 

@@ -50,8 +50,8 @@ class TrackerSource(LiveSource):
             self.count("poses_malformed")
         else:
             try:
-                pose, _ = decode_pose(sample.payload.to_bytes())
+                pose, utc_ns = decode_pose(sample.payload.to_bytes())
             except BadFrame:
                 self.count("poses_malformed")
             else:
-                self.put(name, pose.x_m, pose.y_m, math.nan, pose.heading_rad)
+                self.put(name, pose.x_m, pose.y_m, math.nan, pose.heading_rad, utc_ns)

@@ -4,7 +4,7 @@
 
 x and y are in the arena's frame, whose origin is its centre; z is the height of the robot's lower side; the heading is
 0 along x and rises to the left. A robot keeps its height and its heading where `z_m` and `heading_rad` are left out.
-Other keys are ignored.
+With `stamps` each message also has its time in s as `t_s`. Other keys are ignored.
 """
 
 import math
@@ -14,6 +14,7 @@ from abc import abstractmethod
 
 import msgspec
 
+from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.motion.live import LiveSource
 from swarmwire.world.scenario.motion import UdpMotion
@@ -32,6 +33,7 @@ class PoseMessage(msgspec.Struct):
     y_m: float
     z_m: float = math.nan
     heading_rad: float = math.nan
+    t_s: float = math.nan
 
 
 class DatagramSource(LiveSource):
@@ -89,7 +91,8 @@ class UdpSource(DatagramSource):
         except (msgspec.MsgspecError, UnicodeDecodeError):
             self.count("poses_malformed")
         else:
-            self.put(message.robot, message.x_m, message.y_m, message.z_m, message.heading_rad)
+            stamp_ns = to_ns(message.t_s) if math.isfinite(message.t_s) else None
+            self.put(message.robot, message.x_m, message.y_m, message.z_m, message.heading_rad, stamp_ns)
 
 
 def _bound(host: str, port: int) -> socket.socket:

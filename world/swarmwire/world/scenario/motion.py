@@ -43,6 +43,9 @@ class _LiveMotion(ScenarioTable):
     """A robot without a new pose for this time counts as silent; it keeps its last pose."""
     max_speed_mps: float = Field(default=100.0, gt=0, le=1e5, json_schema_extra={"unit": "m/s"})
     """A pose that is farther from the last one than this speed allows is a jump: it is counted and ignored."""
+    stamps: bool = False
+    """Whether the stamps of messages order and time the poses, in place of their arrival: a pose with an older stamp
+    than the last one is late: it is counted and ignored, and jumps are judged by the time between stamps."""
     wait_s: float = Field(default=30.0, gt=0, le=86_400, json_schema_extra={"unit": "s"})
     """Time for which the run waits for the first pose of each robot."""
 

@@ -268,7 +268,8 @@ def _poses(source: dict[str, Any]) -> ReportTable:
     )
     caption = (
         f"Poses from {source['source']}: {source['received']:,} were used{_after(source['use'])}. "
-        "The gap is the greatest age of a robot's newest pose at a tick, in wall time; silent are ticks at which it was older than `max_age_s`."
+        "The gap is the greatest age of a robot's newest pose at a tick, in wall time; silent are ticks at which it "
+        "was older than `max_age_s`."
     )
     return ReportTable(("robot", "longest gap in s", "silent ticks"), rows, caption, folded=len(rows) > _MAX_ROBOTS)
 
