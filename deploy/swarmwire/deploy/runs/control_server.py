@@ -51,6 +51,7 @@ class Status(Observer):
         radio: Callable[[], Radio | None],
         events: Callable[[], Sequence[Mapping[str, Any]]],
         compiled_ns: Callable[[], int] = lambda: 0,
+        poses: Callable[[], Sequence[Mapping[str, Any]]] = tuple,
     ) -> None:
         """Make the status of a run; the callables return present values.
 
@@ -66,13 +67,14 @@ class Status(Observer):
             radio: returns the present radio.
             events: returns the list of events.
             compiled_ns: returns the wall time spent on compiling, which is no part of a tick's time.
+            poses: returns the ages of poses of live sources.
         """
         self._run_id, self._scenario, self._ticks = run_id, scenario, ticks
         self._metrics, self._controls, self._clock = metrics, controls, clock
         self._health, self._counts, self._radio, self._events = health, counts, radio, events
         self._truth: Truth | None = None
         self._is_over = False
-        self._compiled_ns = compiled_ns
+        self._compiled_ns, self._poses = compiled_ns, poses
         self._present_tick: tuple[int, int] | None = None  # wall time at its start, and time compiled before it
         self._tick_ns: float | None = None
 
@@ -124,6 +126,7 @@ class Status(Observer):
             "groups": {group.name: group.stop - group.start for group in static.groups},
             "runners": None if health is None else asdict(health),
             "counts": dict(self._counts()),
+            "poses": [] if self._is_over else [dict(ages) for ages in self._poses()],
             "metrics": self._latest_metrics(),
             "radio": None if radio is None else numbers_of(radio),
             "events": [dict(event) for event in self._events()],

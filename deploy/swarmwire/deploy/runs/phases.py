@@ -133,7 +133,7 @@ class PreparedRun:
         log = RunnerLog(writer.report)
         backend = stack.enter_context(open_backend(self._backend_settings(log), served))
         loop = self._new_loop(backend, interfaces, pose_sources, log, stop_conditions)
-        status = self._new_status(backend, loop)
+        status = self._new_status(backend, loop, pose_sources)
         staged = self._staged_observers(loop, status, endpoint, observers)
         if served:
             staged.append(StagedObserver(ObserverStage.PROGRAMS, Undriven(served, self.factor, writer.report)))
@@ -220,7 +220,7 @@ class PreparedRun:
         has_poses = bool(plan.scenario.live_motions())
         return in_real_time or has_changed or has_poses or plan.gateways is not None
 
-    def _new_status(self, backend: AgentBackend, loop: Loop) -> Status:
+    def _new_status(self, backend: AgentBackend, loop: Loop, pose_sources: Sequence[LiveSource]) -> Status:
         return Status(
             run_id=self.run_id,
             scenario=self.plan.scenario.name,
@@ -233,6 +233,7 @@ class PreparedRun:
             radio=lambda: self.live_events.progress.radio,
             events=self.live_events.listing,
             compiled_ns=self.compiling.total_ns,
+            poses=lambda: [source.status() for source in pose_sources],
         )
 
     def _staged_observers(

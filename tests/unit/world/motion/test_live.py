@@ -85,6 +85,15 @@ def test_jump_is_ignored_until_its_speed_would_be_allowed() -> None:
     assert poses(source)[4][0] == 6.0
 
 
+def test_poses_that_arrive_together_may_have_been_sent_a_tenth_of_a_second_apart() -> None:
+    source = given(FakeClock(), max_speed_mps=20.0)
+    source.put("a-0", 0.0, 0.0, 0.0, 0.0)
+    source.put("a-0", 2.0, 0.0, 0.0, 0.0)  # 20 m/s over 0.1 s
+    assert poses(source)[4][0] == 2.0
+    source.put("a-0", 4.2, 0.0, 0.0, 0.0)
+    assert source.counts() == {"poses_jumped": 1}
+
+
 def test_jump_counts_also_in_height() -> None:
     clock = FakeClock()
     source = given(clock, max_speed_mps=2.0, max_age_s=100.0)
@@ -130,6 +139,7 @@ def test_age_beyond_the_limit_counts_ticks_and_shows_in_the_report() -> None:
         clock.time_ns += NS_PER_S // 2
         source.put("a-1", 0.0, 0.0, 0.0, 0.0)
         source.count_ages()
+    assert source.status() == {"source": "given", "oldest": "a-0", "oldest_s": 2.0, "silent": ["a-0"]}
     report = source.report()
     assert report.longest_gap_s == {"a-0": 2.0, "a-1": 0.0}
     assert (report.silent_ticks, report.received) == ({"a-0": 2}, 6)

@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -23,7 +23,8 @@ from swarmwire.world.backends.pacing import LatencyHistogram, LatencySummary, Pa
 from swarmwire.world.scenario.motion import LiveMotion
 
 POLL_NS = to_ns(0.02)  # interval of polls for the first poses
-POSITION_NOISE_M = 0.1  # two poses may arrive together: a difference up to this is no jump
+POSITION_NOISE_M = 0.1  # a difference up to this is no jump
+BURST_S = 0.1  # two poses that were sent up to this time apart may arrive together
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,8 @@ class LiveSource(ABC):
             if timed_ns < self._timed_ns[index]:
                 self._counted["poses_late"] += 1
                 return
-            if away_m > self.motion.max_speed_mps * to_s(timed_ns - self._timed_ns[index]) + POSITION_NOISE_M:
+            time_s = to_s(timed_ns - self._timed_ns[index]) + (0.0 if self.motion.stamps else BURST_S)
+            if away_m > self.motion.max_speed_mps * time_s + POSITION_NOISE_M:
                 self._counted["poses_jumped"] += 1
                 return
         heading_rad = last_heading_rad if math.isnan(heading_rad) else heading_rad
@@ -151,6 +153,14 @@ class LiveSource(ABC):
             self._is_new[index] = False
         self._use.add(np.array([by_ns - self._arrived_ns[index] for index in new]))
         return SparseTable.from_dense(self._rows[new], self._pose[new])
+
+    def status(self) -> dict[str, Any]:
+        """Return the source, the age of the oldest robot's newest pose, and the robots that are silent now."""
+        now_ns = self._clock.now_ns()
+        ages_s = {name: to_s(now_ns - ns) for name, ns in zip(self.names, self._arrived_ns, strict=True)}
+        oldest = max(ages_s, key=ages_s.__getitem__)
+        silent = [name for name, age_s in ages_s.items() if age_s > self.motion.max_age_s]
+        return {"source": self.address, "oldest": oldest, "oldest_s": ages_s[oldest], "silent": silent}
 
     def counts(self) -> dict[str, int]:
         """Return the numbers of unusable poses, and of ticks of silent robots, by name; only those above 0."""

@@ -42,7 +42,8 @@ class _LiveMotion(ScenarioTable):
     max_age_s: float = Field(default=1.0, gt=0, le=3600, json_schema_extra={"unit": "s"})
     """A robot without a new pose for this time counts as silent; it keeps its last pose."""
     max_speed_mps: float = Field(default=100.0, gt=0, le=1e5, json_schema_extra={"unit": "m/s"})
-    """A pose that is farther from the last one than this speed allows is a jump: it is counted and ignored."""
+    """A pose that is farther from the last one than this speed allows is a jump: it is counted and ignored. Without
+    stamps the time between them may have been 0.1 s more than between their arrivals."""
     stamps: bool = False
     """Whether the stamps of messages order and time the poses, in place of their arrival: a pose with an older stamp
     than the last one is late: it is counted and ignored, and jumps are judged by the time between stamps."""

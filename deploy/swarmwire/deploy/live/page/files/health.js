@@ -1,6 +1,21 @@
-// How the runners are doing, and every count that is not 0.
+// How the runners are doing, how old poses from outside are, and every count that is not 0.
 const FINE = ["ready", "robots free"];
+const MAX_NAMES = 5;
 const by = (id) => document.getElementById(id);
+
+const unbroken = (name) => name.replaceAll("-", "\u2011");
+
+function poses({ source, oldest, oldest_s, silent }) {
+  const line = document.createElement("div");
+  line.append(`poses of ${source}: `);
+  if (silent.length) {
+    const more = silent.length > MAX_NAMES ? ", …" : "";
+    line.appendChild(document.createElement("b")).textContent = `${silent.length} silent`;
+    line.append(` (${silent.slice(0, MAX_NAMES).map(unbroken).join(", ")}${more}), `);
+  }
+  line.append(`the oldest ${oldest_s.toFixed(2)} s (${unbroken(oldest)})`);
+  return line;
+}
 
 export function health() {
   return {
@@ -22,6 +37,7 @@ export function health() {
           by("runners").append(item);
         });
       }
+      by("poses").replaceChildren(...(status.poses ?? []).map(poses));
       const counts = Object.entries(status.counts ?? {}).filter(([, count]) => count);
       by("faults").replaceChildren(...counts.map(([name, count]) => {
         const item = document.createElement("li");
