@@ -11,6 +11,7 @@ from pymavlink.dialects.v10 import common as version_1
 from pymavlink.dialects.v20 import ardupilotmega
 from pymavlink.dialects.v20 import common as version_2
 
+from swarmwire.comms.base.clock import NEVER_NS as FOREVER_NS
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.motion.mavlink import MavlinkSource
@@ -35,15 +36,15 @@ def source(request: pytest.FixtureRequest) -> Iterator[MavlinkSource]:
     made.close()
 
 
-local, earthly = ({}, {"origin": ORIGIN})
+local, earthly, stamped = ({}, {"origin": ORIGIN}, {"stamps": True})
 
 
 def packed(message: Any, system: int = 1, component: int = 1, dialect: Any = version_2) -> bytes:
     return message.pack(dialect.MAVLink(None, srcSystem=system, srcComponent=component))
 
 
-def at(x: float, y: float, z: float, dialect: Any = version_2) -> Any:
-    return dialect.MAVLink_local_position_ned_message(0, x, y, z, 0.0, 0.0, 0.0)
+def at(x: float, y: float, z: float, dialect: Any = version_2, boot_ms: int = 0) -> Any:
+    return dialect.MAVLink_local_position_ned_message(boot_ms, x, y, z, 0.0, 0.0, 0.0)
 
 
 def facing(yaw_rad: float) -> Any:
@@ -56,10 +57,17 @@ def fix(latitude: int, longitude: int, altitude_mm: int, hdg: int = UNKNOWN_HDG)
 
 def poses(source: MavlinkSource) -> dict[int, list[float]]:
     """New poses by row."""
-    table, rows = source.pop_new(), dict[int, list[float]]()
+    table, rows = source.pop_new(FOREVER_NS), dict[int, list[float]]()
     for row, value in zip(table.rows.tolist(), table.value.tolist(), strict=True):
         rows.setdefault(row, []).append(value)
     return rows
+
+
+@pytest.mark.parametrize("source", [stamped], indirect=True)
+def test_mavlink_message_with_an_older_time_since_boot_is_late(source: MavlinkSource) -> None:
+    source.take(packed(at(1.0, 2.0, -3.0, boot_ms=500)) + packed(at(0.0, 0.0, -3.0, boot_ms=499)))
+    assert poses(source) == {4: [2.0, 1.0, 3.0]}
+    assert source.counts() == {"poses_late": 1}
 
 
 @pytest.mark.parametrize("source", [local], indirect=True)
