@@ -30,6 +30,7 @@ CRAZYFLIE = Extra("swarmwire-agent[crazyflie]", ("cflib",))  # under the GPL
 FLEET = Extra("swarmwire[fleet]", ("asyncssh", "cryptography", "packaging", "pip"))
 LEARN = Extra("swarmwire[learn]", ("gymnasium", "pettingzoo"))
 MAVLINK = Extra("swarmwire[mavlink]", ("pymavlink",))
+MCAP = Extra("swarmwire[ros2]", ("mcap", "rosbags"))
 POLICY = Extra("swarmwire-agent[policy]", ("onnxruntime",))
 REPORT = Extra("swarmwire-metrics[report]", ("matplotlib", "imageio_ffmpeg", "jinja2"))
 ROS2 = Extra("swarmwire-agent[ros2]", ("rosbags", "xxhash"))

@@ -80,7 +80,7 @@ def export_command(
     size: Size = None,
     origin: Origin = None,
 ) -> None:
-    """Export a run as a picture, film, capture of its radio, table or motion trace; the suffix of the file decides.
+    """Export a run as a picture, film, capture of its radio, recording, table or motion trace, by its suffix.
 
     Pictures and films need no screen. They show the arena, and metrics beside it. If the run recorded packets
     (--packets all), lines are the packets that ended in the tick, each in the colour of its fate: received, lost,

@@ -1,4 +1,4 @@
-"""The files that `swarmwire export` can write: pictures, films, captures, tables and motion traces.
+"""The files that `swarmwire export` can write: pictures, films, captures, recordings, tables and motion traces.
 
 This is the registry; `actions/export.py` writes the files.
 """
@@ -78,6 +78,13 @@ CAPTURE = Exporter(
     frozenset({"from_s", "until_s", "arena"}),
     "export_capture:write_frames",
 )
+BAG = Exporter(
+    "recording",
+    "the run for Foxglove, rviz and ros2 bag",
+    (".mcap",),
+    frozenset({"from_s", "until_s", "arena"}),
+    "export_bag:write_bag",
+)
 METRICS = Exporter(
     "metrics",
     "metrics over time",
@@ -95,7 +102,7 @@ MOTION = Exporter(
 )
 EEL = Exporter("motion", "the robots' motion, for EMANE", (".eel",), MOTION_OPTIONS | {"origin"}, MOTION.function)
 
-EXPORTERS = (ARENA, DELIVERY, VIEWER, GIF, MP4, CAPTURE, METRICS, MOTION, EEL)
+EXPORTERS = (ARENA, DELIVERY, VIEWER, GIF, MP4, CAPTURE, BAG, METRICS, MOTION, EEL)
 DEFAULTS: Mapping[str, Exporter] = {  # the first exporter of each suffix
     suffix: exporter for exporter in reversed(EXPORTERS) for suffix in exporter.suffixes
 }

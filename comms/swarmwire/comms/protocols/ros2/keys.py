@@ -8,6 +8,7 @@ rmw_zenoh: a message travels under domain, full name of the topic, type and its 
 
 import re
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from swarmwire.comms.base.errors import BadFrame, BadInput
@@ -75,6 +76,15 @@ def ros_name(robot: str) -> str:
     """
     name = re.sub(r"[^A-Za-z0-9]+", "_", robot)
     return f"r{name}" if name[:1].isdigit() else name
+
+
+def ros_names(robots: Sequence[str], where: str) -> tuple[str, ...]:
+    """Return the ROS names of robots; BadInput with `where` if two are equal."""
+    names = tuple(map(ros_name, robots))
+    for robot, name in zip(robots, names, strict=True):
+        if names.count(name) > 1:
+            raise BadInput(where, robot, f"expected names that differ in ROS, where this robot is called {name}")
+    return names
 
 
 def absolute(namespace: str, topic: str) -> str:

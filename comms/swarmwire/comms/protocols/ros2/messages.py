@@ -14,7 +14,7 @@ LITTLE_ENDIAN = b"\x00\x01\x00\x00"  # header of little-endian CDR
 TWIST_BYTES = 4 + 48
 MAX_STAMPED_BYTES = 512  # TwistStamped; the name of its frame has at most some hundred letters
 MAX_PADDING = 4  # some writers pad to a multiple of four bytes
-# Messages that rosbags lacks: irobot_create_msgs, equal on its branches humble and rolling.
+# Messages that rosbags lacks: our own, and irobot_create_msgs, equal on its branches humble and rolling.
 PACKAGE = "irobot_create_msgs/msg"
 HAZARD = f"{PACKAGE}/HazardDetection"
 HAZARDS = f"{PACKAGE}/HazardDetectionVector"
@@ -25,6 +25,7 @@ STOP_STATUS = f"{PACKAGE}/StopStatus"
 WHEEL_TICKS = f"{PACKAGE}/WheelTicks"
 WHEEL_VELS = f"{PACKAGE}/WheelVels"
 HEADER = "std_msgs/Header header\n"
+PACKET = "swarmwire_msgs/msg/Packet"  # a packet of an emulated radio at one receiver
 DEFINITIONS = {
     HAZARD: HEADER + "uint8 type",
     HAZARDS: HEADER + "irobot_create_msgs/HazardDetection[] detections",
@@ -34,6 +35,9 @@ DEFINITIONS = {
     STOP_STATUS: HEADER + "bool is_stopped",
     WHEEL_TICKS: HEADER + "int32 ticks_left\nint32 ticks_right",
     WHEEL_VELS: HEADER + "float32 velocity_left\nfloat32 velocity_right",
+    PACKET: HEADER + "builtin_interfaces/Time sent\nbuiltin_interfaces/Time on_air\nstring sender\nstring receiver\n"
+    "string to\nstring fate\nuint32 receivers\nuint64 sequence\nstring topic\nuint32 size_bytes\nfloat32 distance_m\n"
+    "float32 rssi_dbm\nuint8[] payload",
 }
 
 
@@ -72,6 +76,10 @@ class Messages:
             return self._store.deserialize_cdr(payload, kind)
         except (self._fault, IndexError, AssertionError) as error:
             raise BadFrame("malformed", f"{kind}: {error}") from None
+
+    def definition(self, kind: str) -> str:
+        """Return the definitions of a kind of message and of the messages in it, as bags have them (ros2msg)."""
+        return self._store.generate_msgdef(kind, ros_version=2)[0]
 
     def hash_of(self, kind: str) -> str:
         """Return the hash of a kind of message, as rmw_zenoh of the distribution writes it (REP 2016)."""

@@ -16,7 +16,7 @@ from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.base.math import atan2
 from swarmwire.comms.protocols.ros2.covariance import WheelCovariance, variance_of
 from swarmwire.comms.protocols.ros2.keys import IMU, JOINT_STATE, ODOMETRY
-from swarmwire.comms.protocols.ros2.messages import Messages, stamp_ns
+from swarmwire.comms.protocols.ros2.messages import Messages, Velocities, stamp_ns
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import twist_of_wheels, wheels_of_twist
 from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
@@ -46,6 +46,44 @@ def yaw_of(quaternion: Any) -> float:
 def quaternion(messages: Messages, yaw_rad: float) -> Any:
     """Return the quaternion of a yaw."""
     return messages.make("geometry_msgs/msg/Quaternion", 0.0, 0.0, sin(0.5 * yaw_rad), cos(0.5 * yaw_rad))
+
+
+class FramePose(NamedTuple):
+    """Pose of a frame in its parent frame."""
+
+    parent: str
+    name: str
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+    z_m: float = 0.0
+
+
+def odometry_frame(x_m: float, y_m: float, yaw_rad: float) -> FramePose:
+    """Return the frame of the base at its pose by the wheels."""
+    return FramePose(ODOMETRY_FRAME, CHILD_FRAME, x_m, y_m, wrap_angle(yaw_rad))
+
+
+def odometry(
+    messages: Messages,
+    frame: FramePose,
+    velocities: Velocities,
+    covariances: tuple[FloatArray, FloatArray],
+    stamp_ns: int,
+) -> Any:
+    """Return the Odometry of a base: its frame, velocities in it, and the covariances (36,) of pose and twist."""
+    make = messages.make
+    position = make("geometry_msgs/msg/Point", frame.x_m, frame.y_m, frame.z_m)
+    pose = make("geometry_msgs/msg/Pose", position, quaternion(messages, frame.yaw_rad))
+    linear = make("geometry_msgs/msg/Vector3", velocities.linear_mps, velocities.lateral_mps, 0.0)
+    angular = make("geometry_msgs/msg/Vector3", 0.0, 0.0, velocities.angular_radps)
+    return make(
+        ODOMETRY,
+        messages.header(stamp_ns, frame.parent),
+        frame.name,
+        make("geometry_msgs/msg/PoseWithCovariance", pose, covariances[0]),
+        make("geometry_msgs/msg/TwistWithCovariance", make("geometry_msgs/msg/Twist", linear, angular), covariances[1]),
+    )
 
 
 class WheelPoses:
@@ -84,18 +122,12 @@ class WheelPoses:
         """Return the Odometry message of a base."""
         x_m, y_m, turn_rad = map(float, self.pose[base])
         linear_mps, angular_radps = map(float, self.speed[base])
-        make = messages.make
-        position = make("geometry_msgs/msg/Point", x_m, y_m, 0.0)
-        pose = make("geometry_msgs/msg/Pose", position, quaternion(messages, wrap_angle(turn_rad)))
-        linear = make("geometry_msgs/msg/Vector3", linear_mps, 0.0, 0.0)
-        angular = make("geometry_msgs/msg/Vector3", 0.0, 0.0, angular_radps)
-        twist = make("geometry_msgs/msg/Twist", linear, angular)
-        return make(
-            ODOMETRY,
-            messages.header(stamp_ns, ODOMETRY_FRAME),
-            CHILD_FRAME,
-            make("geometry_msgs/msg/PoseWithCovariance", pose, self.covariance.pose_matrix(base)),
-            make("geometry_msgs/msg/TwistWithCovariance", twist, self.covariance.twist_matrix(base)),
+        return odometry(
+            messages,
+            odometry_frame(x_m, y_m, turn_rad),
+            Velocities(linear_mps, angular_radps),
+            (self.covariance.pose_matrix(base), self.covariance.twist_matrix(base)),
+            stamp_ns,
         )
 
 

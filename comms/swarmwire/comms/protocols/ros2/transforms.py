@@ -5,15 +5,14 @@ REP 103).
 """
 
 from math import cos, inf, radians, sin
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base.angles import wrap_angle
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.protocols.ros2.keys import RANGE, TRANSFORMS
 from swarmwire.comms.protocols.ros2.messages import Messages
-from swarmwire.comms.protocols.ros2.motion import BASE_FRAME, CHILD_FRAME, IMU_FRAME, ODOMETRY_FRAME, quaternion
+from swarmwire.comms.protocols.ros2.motion import BASE_FRAME, CHILD_FRAME, IMU_FRAME, FramePose, quaternion
 from swarmwire.comms.protocols.ros2.readings import BUMPER_FRAME, CLIFF_FRAMES, topics_of_light
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.sensors.rays import ProximitySpec
@@ -21,21 +20,6 @@ from swarmwire.comms.robot.sensors.rays import ProximitySpec
 INFRARED = 1  # a constant of Range
 FIELD_OF_VIEW_RAD = radians(15.0)  # proximity sensor, for drawing; the emulated sensor is a ray
 FIRST_WITH_VARIANCE = "iron"  # first distribution in which Range has a variance
-
-
-class FramePose(NamedTuple):
-    """Pose of a frame in its parent frame."""
-
-    parent: str
-    name: str
-    x_m: float = 0.0
-    y_m: float = 0.0
-    yaw_rad: float = 0.0
-
-
-def odometry_frame(x_m: float, y_m: float, yaw_rad: float) -> FramePose:
-    """Return the frame of the base at its pose by the wheels."""
-    return FramePose(ODOMETRY_FRAME, CHILD_FRAME, x_m, y_m, wrap_angle(yaw_rad))
 
 
 def sensor_frames(body: Body) -> tuple[FramePose, ...]:
@@ -78,7 +62,7 @@ def transforms(messages: Messages, frames: tuple[FramePose, ...], stamp_ns: int)
             frame.name,
             make(
                 "geometry_msgs/msg/Transform",
-                make("geometry_msgs/msg/Vector3", frame.x_m, frame.y_m, 0.0),
+                make("geometry_msgs/msg/Vector3", frame.x_m, frame.y_m, frame.z_m),
                 quaternion(messages, frame.yaw_rad),
             ),
         )

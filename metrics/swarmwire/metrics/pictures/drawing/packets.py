@@ -19,7 +19,7 @@ from swarmwire.metrics.records.run_folder.reader import RunFolder
 # A received packet is darker than in the viewer; a fate without a colour has no lines.
 _COLORS = {fate: rgb(color) for fate, color in FATE_COLORS.items()} | {Fate.RECEIVED: CURVE}
 _OPACITY, _MIN_OPACITY, _MAX_OPACITY = 8.0, 0.3, 0.85  # _OPACITY / sqrt(lines), within the bounds
-_REACHED = 0.4  # length of the line of a packet that was not received, as a share of the way
+REACHED = 0.4  # length of the line of a packet that was not received, as a share of the way
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def _cut_off(position_m: FloatArray, ends: IntArray, static: Static) -> FloatArr
     """Return lines (e, 2, 2) from each sender a part of the way to its receiver."""
     start = position_m[ends[:, 0]]
     way = shortest_displacement(position_m[ends[:, 1]] - start, static)
-    return np.stack([start, start + _REACHED * way], axis=1)
+    return np.stack([start, start + REACHED * way], axis=1)
 
 
 def packet_entries(fates: tuple[Fate, ...]) -> list[Any]:

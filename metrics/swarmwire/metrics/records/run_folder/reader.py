@@ -127,8 +127,13 @@ class RunFolder:
         except (KeyError, TypeError, ValueError):
             return {}
 
-    def table(self, name: str, arena: int | None = None, exclude: Sequence[str] = ()) -> pl.DataFrame:
-        """Read a table by name, of one arena or of all, without the excluded columns; BadInput if there is none."""
+    def table(
+        self, name: str, arena: int | None = None, exclude: Sequence[str] = (), rows: pl.Expr | None = None
+    ) -> pl.DataFrame:
+        """Read a table by name, of one arena or of all, without the excluded columns; BadInput if there is none.
+
+        `rows`: only the rows for which it is true.
+        """
         self._refuse_other_format()
         for _ in range(MAX_RETRIES):
             files = self.files(name)
@@ -139,6 +144,8 @@ class RunFolder:
                 self._refuse_size(name, lazy)
                 if arena is not None:
                     lazy = lazy.filter(pl.col("arena") == arena)
+                if rows is not None:
+                    lazy = lazy.filter(rows)
                 return lazy.drop(*exclude, strict=False).collect()
             except FileNotFoundError:
                 continue  # the run ended just now, and its parts were joined
@@ -198,9 +205,9 @@ class RunFolder:
     def _table_error(self, name: str, fault: str) -> BadInput:
         return BadInput(self.where(name), "", f"expected a table as a run writes it, but {fault}; see swarmwire verify")
 
-    def validated(self, name: str, arena: int | None = None) -> pl.DataFrame:
-        """Read a table and check its values; BadInput names file and fault if no run writes such values."""
-        table = self.table(name, arena)
+    def validated(self, name: str, arena: int | None = None, rows: pl.Expr | None = None) -> pl.DataFrame:
+        """Read a table as `table` does, and check its values; BadInput for values that no run writes."""
+        table = self.table(name, arena, rows=rows)
         fault = TABLES[name].fault(table.lazy(), self.static)
         if fault is not None:
             raise self._table_error(name, fault)

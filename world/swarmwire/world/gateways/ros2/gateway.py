@@ -18,7 +18,7 @@ from swarmwire.comms.protocols.ros2.keys import (
     bridge_key,
     bridge_token,
     rmw_key,
-    ros_name,
+    ros_names,
 )
 from swarmwire.comms.protocols.ros2.links import Publisher, check_endpoint, close, open_router
 from swarmwire.comms.protocols.ros2.messages import Messages
@@ -55,7 +55,7 @@ class Ros2Gateway(Gateway):
         check_endpoint(self.address, "ros2", "address")
         self._on_robot = address or ON_ROBOT
         self._options = options
-        self._namespaces = _namespaces(names)
+        self._namespaces = ros_names(names, "ros2")
         self._messages = Messages(options.distro)
         self._broadcasters = broadcasters_of(body, len(names), options)
         self._rates = [ReadingRate(broadcaster.rate_hz) for broadcaster in self._broadcasters]
@@ -166,12 +166,3 @@ def _put(publishers: tuple[Publisher, ...], payload: bytes, now_ns: int) -> None
     for publisher in publishers:
         if publisher.has_subscribers:
             publisher.put(payload, now_ns)
-
-
-def _namespaces(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the namespaces of robots with these names; BadInput if two are equal."""
-    namespaces = tuple(map(ros_name, names))
-    for name, namespace in zip(names, namespaces, strict=True):
-        if namespaces.count(namespace) > 1:
-            raise BadInput("ros2", name, f"expected names that differ in ROS, where this robot is called {namespace}")
-    return namespaces

@@ -6,9 +6,9 @@ from typing import Any
 
 from swarmwire.comms.protocols.ros2.keys import DEFAULT_QOS, JOINT_STATE, ODOMETRY, TRANSFORMS, Qos
 from swarmwire.comms.protocols.ros2.messages import STOP_STATUS, WHEEL_TICKS, WHEEL_VELS, Messages
-from swarmwire.comms.protocols.ros2.motion import WheelPoses, joint_state
+from swarmwire.comms.protocols.ros2.motion import WheelPoses, joint_state, odometry_frame
 from swarmwire.comms.protocols.ros2.readings import stop_status, wheel_ticks, wheel_vels
-from swarmwire.comms.protocols.ros2.transforms import odometry_frame, transforms
+from swarmwire.comms.protocols.ros2.transforms import transforms
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.bodies.drives import wheel_base_of, wheel_radius_of
 from swarmwire.comms.robot.sensors.simple import OdometrySpec

@@ -1,0 +1,1 @@
+"""Runs as MCAP files in the form of ROS 2's bags, for Foxglove, rviz and `ros2 bag`."""
