@@ -14,8 +14,9 @@ from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets
 from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets
 from swarmwire.world.backends.pacing import Pace
+from swarmwire.world.backends.ports import PortsBackend
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
-from swarmwire.world.interfaces.backend import INTERFACE_LOST, MAX_READS, FramePorts, InterfacesBackend
+from swarmwire.world.interfaces.frame_ports import INTERFACE_LOST, MAX_READS, FramePorts
 from tests.support.clocks import MS, FakeClock
 from tests.support.refusals import refused_input
 from tests.support.world.mediums import ScriptedMedium
@@ -70,7 +71,7 @@ class Rig:
         return frame
 
     def pop_sent(self) -> SentPackets:
-        return SentPackets.joined(self.ports.pop_frames())
+        return SentPackets.joined(self.ports.pop_packets())
 
     def received_frames(self, robot: int) -> list[bytes]:
         frames: list[bytes] = []
@@ -231,7 +232,7 @@ def test_frames_of_several_robots_are_sent_at_different_times(rig):
 
     medium = ScriptedMedium()
     ticking = TickingBackend([first, lambda medium: medium.advance(11 * MS), lambda medium: medium.advance(12 * MS)])
-    InterfacesBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
+    PortsBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
     times_ns = [packets.at_ns for packets in medium.sent]
     assert times_ns == sorted(set(times_ns))
     assert 10 * MS < times_ns[0] < times_ns[-1] < 11 * MS
@@ -248,7 +249,7 @@ def test_frames_of_a_single_robot_are_sent_at_once_in_order(rig):
     medium = ScriptedMedium()
     message = SubtickPackets(10 * MS + 5, 3, SentPackets(np.array([1]), np.array([0]), Payloads.from_rows([b"\1\0"])))
     ticking = TickingBackend([first, lambda medium: medium.send(message), lambda medium: medium.advance(11 * MS)])
-    InterfacesBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
+    PortsBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
     sent = [(packets.at_ns, packets.sent.sender.tolist()) for packets in medium.sent]
     assert sent == [(10 * MS, [0, 0, 0]), (10 * MS + 5, [1])]
 
@@ -282,7 +283,7 @@ def test_routes_are_restored_where_links_change(rig):
 def test_robot_leaves_a_namespace_whose_process_ends_and_others_go_on(rig):
     rig.devices[1].ends.sendto(b"end", rig.devices[1].ends.getsockname())
     frame = rig.send(0, station(2))
-    sent = [SentPackets.joined(rig.ports.pop_frames()) for _ in range(2)]
+    sent = [SentPackets.joined(rig.ports.pop_packets()) for _ in range(2)]
     assert [len(packets) for packets in sent] == [1, 0]
     assert exchanged(sent[0].payloads.row(0)) == frame
     (event,) = rig.ports.pop_events(5 * MS)

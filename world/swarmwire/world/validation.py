@@ -8,7 +8,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.protocols.ros2.keys import RADIO_TOPICS, check_name
+from swarmwire.comms.protocols.ros2.relay import PART
 from swarmwire.comms.radio.config.radio import Radio, check_radio, unfit_for_torus
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.world.actuation.actuators import noise_of
@@ -39,6 +42,7 @@ def check(scenario: Scenario, where: str) -> None:
         _check_torus(scenario, scenario.radio, where)
     _check_antennas(scenario, where)
     _check_motion(scenario, where)
+    _check_relay(scenario, where)
     for i, event in enumerate(scenario.events):
         check_event(scenario, bodies, event, f"events.{i}", where)
 
@@ -97,6 +101,25 @@ def _check_motion(scenario: Scenario, where: str) -> None:
                 reason = "its positions are latitudes and longitudes" if is_geodetic else "only for .eel"
                 got = "" if is_geodetic else "no "
                 raise BadInput(where, f"robots.{group}.motion.origin", f"expected {got}origin for this file: {reason}")
+
+
+def _check_relay(scenario: Scenario, where: str) -> None:
+    topics, radio = scenario.ros2.relay.topics, scenario.radio
+    if topics and (radio is None or radio.max_payload_bytes <= PART.size):
+        got = f"got packets of at most {radio.max_payload_bytes}" if radio else "there is no [radio]"
+        raise BadInput(where, "ros2.relay", f"expected a radio with packets of more than {PART.size} bytes: {got}")
+    names = [topic.name for topic in topics]
+    robots = (*scenario.robots, *scenario.robot_names())
+    for i, topic in enumerate(topics):
+        key = f"ros2.relay.topics.{i}"
+        check_name(topic.name, where, f"{key}.name")
+        if topic.name.startswith(("/", RADIO_TOPICS)) or topic.name in names[:i]:
+            expected = f"expected names that differ, in the robots' namespaces, outside {RADIO_TOPICS}"
+            raise BadInput(where, f"{key}.name", f"{expected}; got {topic.name!r}")
+        for name in topic.to:
+            if name not in robots:
+                expected = f"expected groups or robots of the scenario, {did_you_mean(robots, name)}; got {name!r}"
+                raise BadInput(where, f"{key}.to", expected)
 
 
 def _check_impulse(scenario: Scenario, bodies: Mapping[str, Body], event: Impulse) -> None:

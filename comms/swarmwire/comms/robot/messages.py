@@ -49,6 +49,8 @@ u4 = Annotated[float, np.dtype("<u4")]  # uint32 on air
 STRUCT_FORMATS = {"<f4": "f", "<f8": "d", "|i1": "b", "<i2": "h", "<i4": "i", "|u1": "B", "<u2": "H", "<u4": "I"}
 SEND_PARAMETERS = ("rows", "to")  # parameters of a VectorAgent's `send`; the others are the fields of the message
 DICT_TAG = 0  # tag of a dict in msgpack, for prototypes; no class has this tag
+RELAY_TAG = FRAME_TAG + 1  # tag of a packet of the relay of ROS 2 topics
+RESERVED_TAGS = (FRAME_TAG, RELAY_TAG)  # tags of packets that are no messages
 
 
 class FieldRange(NamedTuple):
@@ -258,4 +260,6 @@ def _range(dtype: np.dtype[Any]) -> FieldRange:
 def _tag(name: str, fields: list[tuple[str, np.dtype[Any]]]) -> int:
     text = f"{name}({','.join(f'{field}:{dtype.str}' for field, dtype in fields)})"
     tag = 1 + int.from_bytes(blake2b(text.encode(), digest_size=2).digest(), "little") % 0xFFFF
-    return tag + (tag == FRAME_TAG)
+    while tag in RESERVED_TAGS:
+        tag += 1
+    return tag

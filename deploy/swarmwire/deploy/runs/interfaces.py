@@ -24,8 +24,8 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.deploy.machine import need_open_files
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.interfaces.addresses import Addresses, addresses_of, check_unused
-from swarmwire.world.interfaces.backend import INTERFACE_LOST, FramePorts
 from swarmwire.world.interfaces.entering import INTERFACES, RobotNamespace, process_start
+from swarmwire.world.interfaces.frame_ports import INTERFACE_LOST, FramePorts
 from swarmwire.world.interfaces.joining import Join, find_namespaces, joins_of
 from swarmwire.world.interfaces.namespaces import (
     DEVICE,

@@ -7,10 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import cast
 
-from swarmwire.comms.base.clock import PreciseClock, WallClock, to_ns
+from swarmwire.comms.base.clock import PreciseClock, ScaledClock, WallClock, to_ns
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
-from swarmwire.comms.robot.messages import DICT_TAG, message_classes
+from swarmwire.comms.robot.messages import DICT_TAG, RELAY_TAG, message_classes
 from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.deploy.machine import need_address_space, need_open_files, need_threads
 from swarmwire.deploy.runs.backends import (
@@ -42,6 +42,7 @@ from swarmwire.deploy.runs.record.folder import RunWriter
 from swarmwire.deploy.runs.record.inputs import ReplayedBackend
 from swarmwire.deploy.runs.record.provenance import RunFacts
 from swarmwire.deploy.runs.record.replay_logs import TrajectoryLog
+from swarmwire.deploy.runs.ros_radio import check_relay, open_ros_radio
 from swarmwire.deploy.runs.runners import check_isolation
 from swarmwire.metrics.measures.measure import MeasuredStopConditions, Metrics
 from swarmwire.metrics.measures.network.latency import RadioTally
@@ -51,7 +52,8 @@ from swarmwire.metrics.records.run_folder.layout import RECORDING
 from swarmwire.metrics.records.run_folder.table import RecordOptions
 from swarmwire.metrics.records.run_folder.tables import recorders
 from swarmwire.world.backends.pacing import Pace
-from swarmwire.world.interfaces.backend import InterfacesBackend
+from swarmwire.world.backends.ports import PortsBackend
+from swarmwire.world.gateways.ros2.radio import RosRadio
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
 from swarmwire.world.motion.live import FollowingBackend, LiveSource, wait_for_poses
@@ -69,6 +71,7 @@ class Run:
     status: Status
     served: Served | None  # robots that answer as real ones
     pose_sources: tuple[LiveSource, ...]
+    ros_radio: RosRadio | None  # topics of ROS 2 on the radio
     facts: RunFacts
     log: RunnerLog
 
@@ -114,6 +117,7 @@ class PreparedRun:
             plan.interfaces.check_machine(static, plan.factor)
         if not plan.config.replay:
             check_live_sources(plan.scenario, static, in_real_time=plan.factor is not None)
+            check_relay(plan.scenario, list(plan.gateways.kinds.values()) if plan.gateways else [])
         facts = writer.begin(plan.scenario, plan.facts())
         if self.pace:  # kernels are loaded before gateways answer, and before the pace begins
             world = plan.new_world()
@@ -129,10 +133,11 @@ class PreparedRun:
         if plan.scenario.live_motions() and not plan.config.replay:
             poses = open_sources(plan.scenario, static, self.clock, writer.report)
             pose_sources = stack.enter_context(poses)
+        ros_radio = open_ros_radio(plan.scenario, static, served, pose_sources, ScaledClock(self.clock, self.factor))
         endpoint = self._observer_endpoint(stack)
         log = RunnerLog(writer.report)
         backend = stack.enter_context(open_backend(self._backend_settings(log), served))
-        loop = self._new_loop(backend, interfaces, pose_sources, log, stop_conditions)
+        loop = self._new_loop(backend, interfaces, ros_radio, pose_sources, log, stop_conditions)
         status = self._new_status(backend, loop, pose_sources)
         staged = self._staged_observers(loop, status, endpoint, observers)
         if served:
@@ -141,7 +146,7 @@ class PreparedRun:
             staged.append(StagedObserver(ObserverStage.PROGRAMS, InterfacesLog(interfaces, writer.report)))
         run_observers = RunObservers(staged, writer.report)
         loop.observers = run_observers.ordered
-        return Run(loop, backend, run_observers, status, served, pose_sources, facts, log)
+        return Run(loop, backend, run_observers, status, served, pose_sources, ros_radio, facts, log)
 
     def _serve(self, gateways: RunGateways, *, has_interfaces: bool) -> AbstractContextManager[Served]:
         writer, agents = self.writer, self.plan.agents
@@ -171,6 +176,7 @@ class PreparedRun:
         self,
         backend: AgentBackend,
         interfaces: OpenInterfaces | None,
+        ros_radio: RosRadio | None,
         pose_sources: Sequence[LiveSource],
         log: RunnerLog,
         stop_conditions: StopConditions | None,
@@ -184,8 +190,8 @@ class PreparedRun:
         if pose_sources and self.pace:
             first_poses = partial(self._first_poses, pose_sources)
             acting = FollowingBackend(acting, pose_sources, self.pace, subtick_ns, first_poses)
-        if interfaces:
-            acting = InterfacesBackend(cast("TimedBackend", acting), interfaces.ports, subtick_ns)
+        for ports in (ros_radio, interfaces.ports if interfaces else None):
+            acting = PortsBackend(acting, ports, subtick_ns) if ports else acting
         acting = self.writer.record_actions(acting, partial(self._has_external_actions, backend, log))
         return Loop(
             self.world,
@@ -262,7 +268,9 @@ class PreparedRun:
         record, metrics, clock = self.plan.record, self.metrics, self.clock
         observers: list[Observer] = [TrajectoryLog(folder, loop.hexdigests)]  # first: it has each tick of a killed run
         if record.tables:
-            topics = {DICT_TAG: "dict", FRAME_TAG: "frame"} | {kind.tag: kind.__name__ for kind in message_classes()}
+            topics = {DICT_TAG: "dict", FRAME_TAG: "frame", RELAY_TAG: "relay"} | {
+                kind.tag: kind.__name__ for kind in message_classes()
+            }
             may_drop = self.pace is not None
             options = RecordOptions(
                 folder, metrics, clock, record.packets, topics, links=record.links, may_drop=may_drop

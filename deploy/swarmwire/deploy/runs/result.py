@@ -18,7 +18,8 @@ from swarmwire.metrics.records.run_folder.layout import SUMMARY_FORMAT
 from swarmwire.metrics.records.run_folder.tables import record_summary
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.backends.runner_reports import RunnerEvent
-from swarmwire.world.interfaces.backend import InterfacesReport
+from swarmwire.world.gateways.ros2.radio import RelayReport
+from swarmwire.world.interfaces.frame_ports import InterfacesReport
 from swarmwire.world.loop import Loop
 from swarmwire.world.motion.live import PosesReport
 from swarmwire.world.world import World
@@ -118,6 +119,7 @@ class Result:
     realtime: RealTimeReport | None
     interfaces: InterfacesReport | None  #: report on the robots' network interfaces
     poses: tuple[PosesReport, ...]  #: reports on the live sources of poses
+    relay: tuple[RelayReport, ...]  #: reports on the relayed topics of ROS 2
     facts: RunFacts
     inputs: InputsRecord | None  #: recorded external actions
     live_events: LiveEventsRecord | None  #: recorded live events
@@ -179,6 +181,7 @@ class Result:
             "realtime": asdict(self.realtime) if self.realtime else None,
             "interfaces": asdict(self.interfaces) if self.interfaces else None,
             "poses": [asdict(report) for report in self.poses],
+            "relay": [asdict(report) for report in self.relay],
             "gateways": dict(self.facts.gateways),
             "record": self.record,
             "cpu": self.facts.cpu,
@@ -230,6 +233,7 @@ def result_of(
         realtime=realtime,
         interfaces=entries.get("interfaces"),
         poses=tuple(source.report() for source in run.pose_sources),
+        relay=run.ros_radio.report() if run.ros_radio else (),
         facts=facts,
         inputs=writer.inputs(),
         live_events=writer.live_events(),

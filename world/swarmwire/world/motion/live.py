@@ -47,6 +47,7 @@ class LiveSource(ABC):
 
     Attributes:
         address: where poses arrive; known from `open` on.
+        rows: the robot rows.
     """
 
     address: str
@@ -64,6 +65,7 @@ class LiveSource(ABC):
             clock: dates arrivals.
         """
         self.motion, self.names = motion, tuple(names)
+        self.rows = tuple(rows)
         self._rows = np.array(rows, np.int64)
         self._index_of = {name: index for index, name in enumerate(names)}
         self._half_m, self._clock = half_m, clock

@@ -1,7 +1,7 @@
 """Poses of ROS 2 topics, over rmw_zenoh or zenoh-bridge-ros2dds: Odometry, PoseStamped, or transforms."""
 
 from functools import partial
-from threading import Event, Thread
+from threading import Event, Lock, Thread
 from typing import Any
 
 import zenoh
@@ -15,6 +15,7 @@ from swarmwire.comms.protocols.ros2.keys import (
     TRANSFORMS,
     RmwNode,
     absolute,
+    bridge_itself,
     bridge_key,
     check_name,
     rmw_key,
@@ -23,6 +24,7 @@ from swarmwire.comms.protocols.ros2.keys import (
 from swarmwire.comms.protocols.ros2.links import Subscription, check_endpoint, close, open_client, open_router
 from swarmwire.comms.protocols.ros2.messages import Messages
 from swarmwire.comms.protocols.ros2.poses import ONLY, poses_of, space_pose, transform_name
+from swarmwire.world.gateways.ros2.radio import RADIO_NODE, RosRadio
 from swarmwire.world.motion.live import LiveSource
 from swarmwire.world.scenario.motion import Ros2Motion
 
@@ -42,6 +44,8 @@ class Ros2Source(LiveSource):
         self._messages = Messages(self.motion.distro)
         self._name_of = self._names_by_pose()
         self._sessions: list[zenoh.Session] = []
+        self._radio: RosRadio | None = None
+        self._lock = Lock()  # of sessions and radio
         self._tokens: list[Any] = []  # zenoh undeclares a token with its last reference
         self._is_closed, self._threads = Event(), list[Thread]()
         connect, listen = self.motion.connect, self.motion.listen
@@ -64,6 +68,30 @@ class Ros2Source(LiveSource):
         for session in self._sessions:
             close(session)
         self._sessions, self._tokens = [], []
+
+    def join(self, radio: RosRadio) -> None:
+        """Offer the robots' topics of the radio, in their namespaces; BadInput for names that cannot be used."""
+        radio.check(self._messages)
+        for name in (namespaces := self._namespaces()):
+            check_name(name, "motion", "namespace")
+        if len(set(namespaces)) < len(namespaces):
+            raise BadInput("motion", "namespace", "expected {name}, {index} or {number} in it: robots would share one")
+        with self._lock:
+            self._radio, sessions = radio, tuple(self._sessions)
+        for session in sessions:
+            self._offer(radio, session)
+
+    def _namespaces(self) -> list[str]:
+        names = (_filled(self.motion.namespace, name, index) for index, name in enumerate(self.names))
+        return [absolute("/", name) for name in names]
+
+    def _offer(self, radio: RosRadio, session: zenoh.Session) -> None:
+        is_rmw, zid = self.motion.transport == "rmw", str(session.zid())
+        if not is_rmw:
+            self._tokens.append(session.liveliness().declare_token(bridge_itself(zid)))
+        for index, (row, namespace) in enumerate(zip(self.rows, self._namespaces(), strict=True)):
+            node = RmwNode(self.motion.domain, zid, 1 + index, namespace, RADIO_NODE)
+            radio.join(row, session, node, self._messages, is_rmw=(is_rmw,))
 
     def _names_by_pose(self) -> dict[str, dict[str, str]]:
         """Return the robot of each pose, by the topic's full name and by the pose's name in its messages."""
@@ -105,7 +133,11 @@ class Ros2Source(LiveSource):
 
     def _subscribe(self, session: zenoh.Session) -> None:
         """Subscribe to all topics, and take part in the graph of rmw_zenoh: some nodes publish for subscribers only."""
-        self._sessions.append(session)
+        with self._lock:
+            self._sessions.append(session)
+            radio = self._radio
+        if radio:
+            self._offer(radio, session)
         motion, is_rmw = self.motion, self.motion.transport == "rmw"
         node = RmwNode(motion.domain, str(session.zid()), 0, "/", NODE)
         tokens = [node.token] if is_rmw else []

@@ -103,6 +103,8 @@ class Ros2Motion(_LiveMotion):
     """Each robot's frame in messages of the type TFMessage, with {name}, {index} or {number}."""
     parent: str = Field(default="map", min_length=1)
     """Parent of these frames, which is the arena's frame; transforms to other parents are ignored."""
+    namespace: str = Field(default="/{name}", min_length=1)
+    """Namespace of each robot's nodes, with {name}, {index} or {number}, for topics that cross the radio."""
     transport: Literal["bridge", "rmw"] = "rmw"
     """The nodes' connection to zenoh: zenoh-bridge-ros2dds or rmw_zenoh."""
     domain: int = Field(default=0, ge=0, le=232)

@@ -16,6 +16,7 @@ from swarmwire.world.events.event import Event
 from swarmwire.world.events.selection import Groups
 from swarmwire.world.scenario.arena import ArenaTable
 from swarmwire.world.scenario.motion import LiveMotion, MotionTable
+from swarmwire.world.scenario.ros2 import Ros2Table
 from swarmwire.world.scenario.schema import AsTable, OneOf
 from swarmwire.world.scenario.tables import (
     AtPoses,
@@ -128,6 +129,8 @@ class Scenario(ScenarioTable):
     """Stop conditions: the first that holds ends an arena before `duration_s`."""
     run: RunTable = RunTable()
     """Runners."""
+    ros2: Ros2Table = Ros2Table()
+    """Topics of ROS 2 that cross the radio."""
 
     @field_validator("radio", mode="before")
     @classmethod

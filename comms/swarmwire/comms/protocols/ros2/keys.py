@@ -24,9 +24,11 @@ IMU = "sensor_msgs/msg/Imu"  # acceleration, turn rate, orientation
 BATTERY_STATE = "sensor_msgs/msg/BatteryState"  # voltage and charge
 ILLUMINANCE = "sensor_msgs/msg/Illuminance"  # reading of a photocell, in lux
 CLOCK = "rosgraph_msgs/msg/Clock"  # simulated time
+BYTES = "std_msgs/msg/UInt8MultiArray"  # bytes, with the names of their dimensions
 TRANSFORMS = "tf2_msgs/msg/TFMessage"  # poses of frames in their parents
 RANGE = "sensor_msgs/msg/Range"  # distance that a proximity sensor measures
 
+RADIO_TOPICS = "radio/"  # topics of a robot's radio, in its namespace
 TOKEN = r"(?!.*__)[A-Za-z_][A-Za-z0-9_]*"
 NAME = re.compile(rf"/?{TOKEN}(?:/{TOKEN})*")
 READ, WRITE = "MS", "MP"  # the two directions of a topic in a token

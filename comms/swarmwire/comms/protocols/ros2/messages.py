@@ -54,6 +54,10 @@ class Messages:
         for kind, definition in DEFINITIONS.items():
             self._store.register(get_types_from_msg(definition, kind))
 
+    def has(self, kind: str) -> bool:
+        """Return True if the distribution has this kind of message."""
+        return kind in self._store.types
+
     def make(self, kind: str, *fields: Any) -> Any:
         """Make a message with these fields, in the order of its definition."""
         return self._store.types[kind](*fields)

@@ -218,7 +218,7 @@ def _ratio(name: str, ratio: float | None) -> str:
 
 
 def _real_time_parts(run: RunData) -> list[Part]:
-    """Return the lateness of ticks, packets and frames, and the gaps of poses from outside.
+    """Return the lateness of ticks, packets and frames, the gaps of poses from outside, and the relayed topics.
 
     Nothing for a run in lockstep, or without a summary.
     """
@@ -235,7 +235,8 @@ def _real_time_parts(run: RunData) -> list[Part]:
     columns = ("what", "count", "p50 in ms", "p99 in ms", "worst in ms")
     table = [ReportTable(columns, rows, _LATE_CAPTION)] if rows else []
     poses = [_poses(source) for source in run.summary["poses"]]
-    return [_pace(pace, run.summary["ticks"]), *table, *([_frames(frames)] if frames else []), *poses]
+    relayed = [_relayed(topic) for topic in run.summary["relay"]]
+    return [_pace(pace, run.summary["ticks"]), *table, *([_frames(frames)] if frames else []), *poses, *relayed]
 
 
 REAL_TIME = ReportSection("Real time", _real_time_parts)
@@ -276,6 +277,20 @@ def _poses(source: dict[str, Any]) -> ReportTable:
 
 def _after(use: dict[str, Any] | None) -> str:
     return f", 99 % of them within {number(1e3 * use['p99_s'])} ms of their arrival" if use else ""
+
+
+def _relayed(topic: dict[str, Any]) -> ReportTable:
+    """Return a row per robot of a topic of ROS 2 that crossed the radio, with a row of totals."""
+    numbers = ("messages", "received", "packets", "bytes")
+    robots: dict[str, dict[str, int]] = {**topic["robots"], "all": topic}
+    rows = tuple((name, *(f"{counts[key]:,}" for key in numbers)) for name, counts in robots.items())
+    kind = f"reliable, {topic['repeated']:,} parts repeated on request" if topic["reliable"] else "best effort"
+    caption = (
+        f"Topic {topic['topic']} over the radio ({kind}): of {topic['intended']:,} intended receptions "
+        f"{topic['lost']:,} were lost. Messages are the robot's, received those of others. Packets and bytes are the "
+        "payloads that its radio was to send, requests included."
+    )
+    return ReportTable(("robot", *numbers), rows, caption, folded=len(rows) > _MAX_ROBOTS)
 
 
 def _delay_cells(delay: dict[str, Any]) -> tuple[str, ...]:

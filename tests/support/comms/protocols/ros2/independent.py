@@ -22,6 +22,25 @@ class Header(IdlStruct, typename="std_msgs/msg/Header"):
 
 
 @dataclass
+class MultiArrayDimension(IdlStruct, typename="std_msgs/msg/MultiArrayDimension"):
+    label: str
+    size: uint32
+    stride: uint32
+
+
+@dataclass
+class MultiArrayLayout(IdlStruct, typename="std_msgs/msg/MultiArrayLayout"):
+    dim: sequence[MultiArrayDimension] = field(default_factory=list)
+    data_offset: uint32 = 0
+
+
+@dataclass
+class UInt8MultiArray(IdlStruct, typename="std_msgs/msg/UInt8MultiArray"):
+    layout: MultiArrayLayout = field(default_factory=MultiArrayLayout)
+    data: sequence[uint8] = field(default_factory=list)
+
+
+@dataclass
 class Vector3(IdlStruct, typename="geometry_msgs/msg/Vector3"):
     x: float64 = 0.0
     y: float64 = 0.0

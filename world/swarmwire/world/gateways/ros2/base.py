@@ -162,6 +162,8 @@ class Base:
     """A base that accepts Twist and TwistStamped on `cmd_vel`, and has a topic for each broadcaster.
 
     Attributes:
+        session: the session with its topics.
+        node: its node in the graph of rmw_zenoh.
         inbox: its commands.
         publishers: publishers of each broadcaster to nodes behind a bridge and of rmw_zenoh; [] while it is hidden.
     """
@@ -176,9 +178,8 @@ class Base:
         *,
         stamped: bool,
     ) -> None:
-        """`node` is its node in the graph of rmw_zenoh; `stamped`: the graphs announce `cmd_vel` as TwistStamped."""
-        self.inbox = inbox
-        self._session = session
+        """`stamped`: the graphs announce `cmd_vel` as TwistStamped."""
+        self.inbox, self.session, self.node = inbox, session, node
         topics = [(WRITE, each.topic, each.kind, each.qos) for each in broadcasters]
         topics.append((READ, COMMAND_TOPIC, TWIST_STAMPED if stamped else TWIST, DEFAULT_QOS))
         endpoints = [
@@ -215,10 +216,10 @@ class Base:
         for key, decode, attached in self._commands:
             accept = partial(self.inbox.accept, decode=decode)
             self._subscriptions.append(
-                Subscription(self._session, key, attached=attached, on_payload=accept, on_fault=self.inbox.refuse)
+                Subscription(self.session, key, attached=attached, on_payload=accept, on_fault=self.inbox.refuse)
             )
         self.publishers = [(to_bridge(), to_rmw()) for to_bridge, to_rmw in self._openers]
-        self._declared = [self._session.liveliness().declare_token(token) for token in self._tokens]
+        self._declared = [self.session.liveliness().declare_token(token) for token in self._tokens]
 
     def hide(self) -> None:
         """Disappear from the graphs, as a base that was switched off; no effect if it is hidden."""

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -28,6 +29,7 @@ from swarmwire.comms.robot.tick_io import NOTHING_SET
 from swarmwire.world.gateways.gateway import FRESH, ForeignCommands, Gateway
 from swarmwire.world.gateways.ros2.base import NODE, Base, CommandInbox, ReadingRate
 from swarmwire.world.gateways.ros2.publishers import Ros2GatewayOptions, broadcasters_of
+from swarmwire.world.gateways.ros2.radio import RADIO_NODE, RosRadio
 
 ANY_PORT = "tcp/127.0.0.1:0"  # the system chooses the port
 ON_ROBOT = "tcp/127.0.0.1:7447"  # default address of the router for nodes of rmw_zenoh
@@ -86,6 +88,13 @@ class Ros2Gateway(Gateway):
     def on_robot(self, address: str) -> str:
         """See `Gateway.on_robot`; the address is the same for all robots."""
         return self._on_robot
+
+    def join(self, radio: RosRadio, first: int) -> None:
+        """Offer the robots' topics of the radio, in their namespaces; `first` is the row of the first robot."""
+        radio.check(self._messages)
+        for index, base in enumerate(self._bases):
+            node = replace(base.node, index=len(self._bases) + 1 + index, name=RADIO_NODE)
+            radio.join(first + index, base.session, node, self._messages, is_rmw=(False, True))
 
     def _serve(self, indices: Sequence[int], address: str) -> tuple[str, ...]:
         """Open a router for the robots with these indices in the group, and return their addresses."""

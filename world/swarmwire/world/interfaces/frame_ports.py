@@ -1,10 +1,4 @@
-"""Frames of robots' interfaces on the radio medium, in addition to the agents' messages.
-
-`FramePorts` reads the frames that programs sent from the TAP devices, and writes received ones to them.
-`InterfacesBackend` wraps a backend in real time with a medium that also carries frames: in every sub-tick it reads the
-frames of the devices, which are sent within the next sub-tick (`spread`), and writes received frames. The wrapped
-backend gets only the agents' packets.
-"""
+"""Frames of robots' interfaces on the radio medium: read from the TAP devices, and written to them."""
 
 import os
 import select
@@ -15,13 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmwire.comms.base.clock import to_ns
-from swarmwire.comms.base.draws import derive_key, purpose
 from swarmwire.comms.base.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, LATE_S, addressee, exchanged
-from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets, TimedBackend
 from swarmwire.comms.observe.truth import EventRecord
-from swarmwire.comms.radio.send_times import keyed_ns
-from swarmwire.comms.robot.packets import TAG_BYTES, Payloads, ReceivedPackets, SentPackets, TxStatuses
-from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
+from swarmwire.comms.robot.packets import TAG_BYTES, Payloads, ReceivedPackets, SentPackets
 from swarmwire.world.backends.pacing import LatencyHistogram, LatencySummary, Pace
 from swarmwire.world.interfaces.namespaces import RobotInterface
 from swarmwire.world.interfaces.programs import robot_event
@@ -32,7 +22,6 @@ MAX_FRAME_BYTES = HEADER_BYTES + 65_535
 MAX_READS = 64  # frames of one device in a sub-tick: a program that floods its device must not stop the world
 NO_DESCRIPTOR = -1
 LATENCY_BATCH = 1024  # latencies that are counted at once, since a batch costs as much as one
-SPREAD_KEY, SPREAD = np.array([derive_key("frames")], np.uint64), purpose("send time of frames")
 
 
 @dataclass(frozen=True)
@@ -65,7 +54,7 @@ class FramePorts:
         self._buffer = bytearray(MAX_FRAME_BYTES)
         self._sent = self._sent_bytes = self._delivered = self._delivered_bytes = self._late = 0
 
-    def pop_frames(self) -> list[SentPackets]:
+    def pop_packets(self) -> list[SentPackets]:
         """Remove and return the frames that programs sent, as packets of each robot."""
         frames = dict[int, list[bytes]]()  # robot -> frames
         for _ in range(MAX_READS):
@@ -91,10 +80,10 @@ class FramePorts:
         lost, self._lost = self._lost, []
         return tuple(robot_event(start_ns, INTERFACE_LOST, robot, len(self._interfaces)) for robot in lost)
 
-    def count_sent(self, frames: SentPackets) -> None:
+    def count_sent(self, packets: SentPackets) -> None:
         """Count frames that were put on the medium."""
-        self._sent += len(frames)
-        self._sent_bytes += len(frames.payloads.data)
+        self._sent += len(packets)
+        self._sent_bytes += len(packets.payloads.data)
 
     def deliver(self, received: ReceivedPackets) -> ReceivedPackets:
         """Write the frames among these packets to their receivers' devices; return the other packets."""
@@ -194,77 +183,3 @@ def _as_packets(robot: int, frames: list[bytes]) -> SentPackets:
     """Return the frames of a robot's programs as packets."""
     to, payloads = [addressee(frame) for frame in frames], [exchanged(frame) for frame in frames]
     return SentPackets(np.array([robot] * len(to)), np.array(to), Payloads.from_rows(payloads))
-
-
-class InterfacesBackend:
-    """A backend in real time with frames of interfaces in addition to its packets."""
-
-    def __init__(self, backend: TimedBackend, ports: FramePorts, subtick_ns: int) -> None:
-        """`subtick_ns` is the interval at which frames are read, in simulated time."""
-        self._backend, self._ports, self._subtick_ns = backend, ports, subtick_ns
-        self._waiting: list[SubtickPackets] = []  # sorted by time; some wait for the next tick
-        self._reads = 0
-        self.start, self.act, self.close = backend.start, backend.act, backend.close
-
-    def act_in_time(
-        self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
-    ) -> Actions:
-        """Act as the wrapped backend; its medium also carries frames."""
-        messages = self._ports.deliver(received)
-        return self._backend.act_in_time(tick, readings, messages, tx_status, _MediumWithFrames(medium, self))
-
-    def counts(self) -> dict[str, int]:
-        """Return the numbers of faults of the backend and of the interfaces, by name."""
-        return {**self._backend.counts(), **self._ports.counts()}
-
-    def send_waiting(self, medium: SubtickMedium, until_ns: int) -> None:
-        """Put the frames on the medium that are due."""
-        while self._waiting and self._waiting[0].at_ns <= until_ns:
-            packets = self._waiting.pop(0)
-            self._ports.count_sent(packets.sent)
-            medium.send(packets)
-
-    def exchange(self, received: ReceivedPackets, now_ns: int) -> ReceivedPackets:
-        """Deliver frames and read new ones; return the packets that are no frames."""
-        messages, frames = self._ports.deliver(received), self._ports.pop_frames()
-        if frames:
-            start_ns = max(now_ns, self._waiting[-1].at_ns) if self._waiting else now_ns
-            self._waiting += spread(frames, start_ns, self._subtick_ns, self._reads)
-            self._reads += 1
-        return messages
-
-
-def spread(frames: Sequence[SentPackets], start_ns: int, subtick_ns: int, number: int) -> list[SubtickPackets]:
-    """Spread the frames of a reading over the sub-tick that starts at `start_ns`, with a separate time for each robot.
-
-    Programs sent them at any time of the last sub-tick. At the same time they would collide, since a station on an idle
-    medium sends at once. The frames of a single robot need not wait. `number` of the reading keys the draws.
-    """
-    if len(frames) == 1:
-        return [SubtickPackets(start_ns, None, frames[0])]
-    offsets_ns = keyed_ns(SPREAD_KEY, number, SPREAD, np.full(len(frames), subtick_ns)).tolist()
-    order = sorted(range(len(frames)), key=offsets_ns.__getitem__)
-    return [SubtickPackets(start_ns + offsets_ns[k], None, frames[k]) for k in order]
-
-
-class _MediumWithFrames:
-    """A medium during a tick that also carries frames between devices."""
-
-    def __init__(self, medium: SubtickMedium, frames: InterfacesBackend) -> None:
-        self._medium, self._frames = medium, frames
-
-    def send(self, packets: SubtickPackets) -> None:
-        """Send packets, after the frames that are due before them."""
-        self._frames.send_waiting(self._medium, packets.at_ns)
-        self._medium.send(packets)
-
-    def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
-        """Advance the medium, and deliver frames; frames that programs sent until now go out after `until_ns`."""
-        self._frames.send_waiting(self._medium, until_ns)
-        received, tx_status = self._medium.advance(until_ns)
-        return self._frames.exchange(received, until_ns), tx_status
-
-    def set_poses(self, at_ns: int, poses: SparseTable) -> None:
-        """Set poses, after the frames that are due before them."""
-        self._frames.send_waiting(self._medium, at_ns)
-        self._medium.set_poses(at_ns, poses)

@@ -1,0 +1,288 @@
+"""The radio of robots as topics of ROS 2: bytes on `radio/tx` and `radio/rx`, and topics that other robots receive.
+
+`RosRadio` is at the medium as `PacketPorts`: messages of nodes become packets of their robot, and received packets
+become messages. It subscribes to exact names only, none of which it publishes to, so nothing is relayed twice.
+"""
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import zenoh
+
+from swarmwire.comms.base.clock import DatedClock, to_ns
+from swarmwire.comms.base.errors import BadFrame, BadInput
+from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.protocols.ros2.keys import (
+    BYTES,
+    DEFAULT_QOS,
+    RADIO_TOPICS,
+    READ,
+    WRITE,
+    Qos,
+    RmwNode,
+    absolute,
+    bridge_key,
+    bridge_token,
+    rmw_key,
+    ros_name,
+)
+from swarmwire.comms.protocols.ros2.links import Publisher, Subscription
+from swarmwire.comms.protocols.ros2.messages import Messages
+from swarmwire.comms.protocols.ros2.relay import REQUEST, RelayedMessage, RelayedTopic, RelayPacket, RobotRelay
+from swarmwire.comms.robot.messages import RELAY_TAG, RESERVED_TAGS
+from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, SentPackets
+from swarmwire.comms.wire.radio_bridge import BoundedInbox
+from swarmwire.world.scenario.scenario import Scenario
+
+RADIO_NODE = "radio"
+TX, RX = f"{RADIO_TOPICS}tx", f"{RADIO_TOPICS}rx"
+MAX_WAITING = 1024  # messages of nodes that wait for the loop
+FOLLOWS = 4  # looks for missing parts in the time after which they are requested
+LATCHED = Qos(depth=1, latched=True)
+
+
+@dataclass(frozen=True)
+class RelayedRobot:
+    """The messages of a relayed topic at one robot."""
+
+    messages: int  #: messages of its nodes
+    received: int  #: messages of other robots that arrived complete
+    packets: int  #: packets of it that were handed to the radio: parts, repeated ones included, and requests
+    bytes: int  #: payloads of these packets, with the relay's headers
+
+
+@dataclass(frozen=True)
+class RelayReport:
+    """A relayed topic over a run. Messages that were neither received nor lost for good at its end count as lost."""
+
+    topic: str  #: name in the robots' namespaces
+    reliable: bool
+    messages: int
+    intended: int  #: number of intended receivers, of all messages
+    received: int
+    lost: int  #: intended - received
+    packets: int
+    bytes: int
+    repeated: int  #: parts that were sent again on request
+    requests: int
+    robots: dict[str, RelayedRobot]
+
+
+class RosRadio:
+    """The topics on the radio of all robots that have topics."""
+
+    def __init__(self, scenario: Scenario, names: Sequence[str], rows: Sequence[int], clock: DatedClock) -> None:
+        """`names` are those of all robots, `rows` those that have topics; the scenario has a radio."""
+        assert scenario.radio
+        self._source, self._table, self._clock = scenario.source, scenario.ros2.relay, clock
+        self._names, self._ros_names = tuple(names), tuple(map(ros_name, names))
+        self._row_of = {name: row for kind in (self._names, self._ros_names) for row, name in enumerate(kind)}
+        retry_after_ns, groups = to_ns(self._table.retry_after_s), scenario.groups()
+        self._receivers = [
+            {row for name in topic.to for row in groups.get(name) or (self._row_of[name],)} or set(rows)
+            for topic in self._table.topics
+        ]
+        self._relays: dict[int, RobotRelay] = {}
+        for row in rows:
+            to = [tuple(sorted(receivers - {row})) for receivers in self._receivers]
+            topics = [
+                RelayedTopic(receivers if topic.to else (BROADCAST,), topic.reliable)
+                for topic, receivers in zip(self._table.topics, to, strict=True)
+            ]
+            self._relays[row] = RobotRelay(
+                topics, scenario.radio.max_payload_bytes, retry_after_ns, self._table.retries
+            )
+        self._messages: dict[int, Messages] = {}  # by row
+        self._publishers: dict[tuple[int, str], list[Publisher]] = defaultdict(list)  # by row and topic
+        self._declared: list[object] = []  # zenoh undeclares unreferenced ones
+        self._inbox = BoundedInbox[Callable[[], None]](MAX_WAITING)
+        self._packets: dict[int, list[RelayPacket]] = {}  # by row: packets of `radio/tx`
+        self._counts, self._sent = Counter[str](), Counter[tuple[str, int, int]]()  # what, row, topic
+        self._follow_ns, self._follow_after_ns = 0, retry_after_ns // FOLLOWS
+
+    def check(self, messages: Messages) -> None:
+        """Raise BadInput for a topic of a type that is not among these messages."""
+        for index, topic in enumerate(self._table.topics):
+            if not messages.has(topic.type):
+                expected = f"expected a type of ROS 2 {messages.distro} that rosbags knows, got {topic.type!r}"
+                raise BadInput(self._source, f"ros2.relay.topics.{index}.type", expected)
+
+    def join(
+        self, row: int, session: zenoh.Session, node: RmwNode, messages: Messages, *, is_rmw: Sequence[bool]
+    ) -> None:
+        """Offer the topics of a robot on a session, as `node`; safe to call from any thread.
+
+        `is_rmw` has True for rmw_zenoh and False for a bridge; `messages` are checked before.
+        """
+        self._messages[row] = messages
+        topics = [(READ, TX, BYTES, DEFAULT_QOS, partial(self._transmit, row))]
+        topics += [(WRITE, RX, BYTES, DEFAULT_QOS, None)]
+        for index, topic in enumerate(self._table.topics):
+            topics.append((READ, topic.name, topic.type, DEFAULT_QOS, partial(self._relay, row, index)))
+            qos = LATCHED if topic.latched else DEFAULT_QOS
+            if row in self._receivers[index]:
+                senders = (sender for sender in self._relays if sender != row)
+                topics += [(WRITE, self._received_name(sender, index), topic.type, qos, None) for sender in senders]
+        tokens = [node.token] if True in is_rmw else []
+        for number, (way, name, kind, qos, accept) in enumerate(topics, start=1):
+            full, type_hash = absolute(node.namespace, name), messages.hash_of(kind)
+            for rmw in is_rmw:
+                endpoint = way, full, kind, type_hash, qos
+                token = node.topic_token(number, *endpoint) if rmw else bridge_token(node.zid, *endpoint)
+                key = rmw_key(node.domain, full, kind, type_hash if way == WRITE else "*") if rmw else bridge_key(full)
+                if accept:
+                    self._declared.append(self._subscribe(session, key, accept, attached=rmw))
+                else:
+                    self._publishers[row, name].append(Publisher(session, key, token if rmw else None, qos))
+                tokens.append(token)
+        self._declared += [session.liveliness().declare_token(token) for token in tokens]
+
+    def deliver(self, received: ReceivedPackets) -> ReceivedPackets:
+        """See `PacketPorts`: publish complete messages on the receivers' topics, and other packets on `radio/rx`."""
+        now_ns = self._clock.now_ns()
+        if now_ns >= self._follow_ns:
+            self._follow_ns = now_ns + self._follow_after_ns
+            for row, relay in self._relays.items():
+                self._publish_messages(row, relay.follow(now_ns))
+        if not len(received):
+            return received
+        is_relay = received.payloads.tags()[received.payload] == RELAY_TAG
+        payloads = {row: received.payloads.row(row) for row in set(received.payload.tolist())}
+        for index in np.flatnonzero(is_relay).tolist():
+            row = int(received.receiver[index])
+            if row in self._relays:
+                sender, payload = int(received.sender_index[index]), payloads[int(received.payload[index])]
+                self._publish_messages(row, self._relays[row].receive(sender, payload, now_ns))
+        for index in np.flatnonzero(~is_relay).tolist():
+            row = int(received.receiver[index])
+            if any(publisher.has_subscribers for publisher in self._publishers.get((row, RX), ())):
+                self._publish(row, RX, self._received_bytes(row, received, index, payloads))
+        return received.select(np.flatnonzero(~is_relay)) if is_relay.any() else received
+
+    def pop_packets(self) -> list[SentPackets]:
+        """See `PacketPorts`."""
+        for take in self._inbox.pop_all():
+            take()
+        packets, self._packets = self._packets, {}
+        for row, relay in self._relays.items():
+            if relayed := relay.pop_packets():
+                packets.setdefault(row, []).extend(relayed)
+        return [
+            SentPackets(
+                np.full(len(queued), row),
+                np.array([packet.to for packet in queued]),
+                Payloads.from_rows([packet.payload for packet in queued]),
+            )
+            for row, queued in sorted(packets.items())
+        ]
+
+    def count_sent(self, packets: SentPackets) -> None:
+        """See `PacketPorts`: count packets and bytes by robot and topic."""
+        tags = packets.payloads.tags()
+        for index in np.flatnonzero(tags == RELAY_TAG).tolist():
+            payload, row = packets.payloads.row(index), int(packets.sender[index])
+            topic = payload[2] % REQUEST
+            self._sent["packets", row, topic] += 1
+            self._sent["bytes", row, topic] += len(payload)
+
+    def counts(self) -> dict[str, int]:
+        """See `PacketPorts`."""
+        counts = Counter(self._counts)
+        counts["ros2_radio_dropped"] += self._inbox.dropped
+        counts["ros2_radio_malformed"] += sum(relay.counts["malformed", -1] for relay in self._relays.values())
+        return {name: count for name, count in sorted(counts.items()) if count}
+
+    def report(self) -> tuple[RelayReport, ...]:
+        """Return the report on each relayed topic so far."""
+        return tuple(self._topic_report(index) for index in range(len(self._table.topics)))
+
+    def _topic_report(self, index: int) -> RelayReport:
+        robots = {
+            self._names[row]: RelayedRobot(
+                relay.counts["messages", index],
+                relay.counts["received", index],
+                self._sent["packets", row, index],
+                self._sent["bytes", row, index],
+            )
+            for row, relay in self._relays.items()
+        }
+        totals = {name: sum(getattr(robot, name) for robot in robots.values()) for name in ("messages", "received")}
+        intended = sum(
+            relay.counts["messages", index] * len(self._receivers[index] - {row}) for row, relay in self._relays.items()
+        )
+        topic = self._table.topics[index]
+        return RelayReport(
+            topic.name,
+            topic.reliable,
+            intended=intended,
+            lost=intended - totals["received"],
+            packets=sum(robot.packets for robot in robots.values()),
+            bytes=sum(robot.bytes for robot in robots.values()),
+            repeated=sum(relay.counts["repeated", index] for relay in self._relays.values()),
+            requests=sum(relay.counts["requests", index] for relay in self._relays.values()),
+            robots=robots,
+            **totals,
+        )
+
+    def _received_name(self, sender: int, topic: int) -> str:
+        """Return the name under which receivers get the topic of a sender."""
+        return f"{RADIO_TOPICS}{self._ros_names[sender]}/{self._table.topics[topic].name}"
+
+    def _subscribe(self, session: zenoh.Session, key: str, take: Callable[[bytes], None], *, attached: bool) -> object:
+        """Queue messages for the loop, with what takes them; the network's threads call the subscriber."""
+        return Subscription(
+            session,
+            key,
+            attached=attached,
+            on_payload=lambda payload: self._inbox.put(partial(take, payload)),
+            on_fault=self._count,
+        )
+
+    def _count(self, fault: str) -> None:
+        self._counts[f"ros2_radio_{fault}"] += 1
+
+    def _relay(self, row: int, topic: int, payload: bytes) -> None:
+        if not self._relays[row].send(topic, payload):
+            self._count("too_large")
+
+    def _transmit(self, row: int, payload: bytes) -> None:
+        """Send the bytes of a message on `radio/tx`, to the robot that its first dimension names, or to all."""
+        try:
+            message = self._messages[row].decode(BYTES, payload)
+        except BadFrame as error:
+            self._count(error.fault)
+            return
+        data, names = message.data.tobytes(), [dimension.label for dimension in message.layout.dim]
+        to = BROADCAST if not names or not names[0] else self._row_of.get(names[0])
+        if to is None:
+            self._count("to_unknown")
+        elif not data or int.from_bytes(data[:2], "little") in RESERVED_TAGS:
+            self._count("malformed")
+        else:
+            self._packets.setdefault(row, []).append(RelayPacket(to, data))
+
+    def _received_bytes(self, row: int, received: ReceivedPackets, index: int, payloads: dict[int, bytes]) -> bytes:
+        """Return a message of a received packet: its bytes, and the sender and measurements as names of dimensions."""
+        make, data = self._messages[row].make, payloads[int(received.payload[index])]
+        labels = [self._ros_names[int(received.sender_index[index])]]
+        labels += [f"{name}={column[index]:.9g}" for name, column in received.measured.items()]
+        dimensions: list[Any] = [
+            make("std_msgs/msg/MultiArrayDimension", label, 1 if at else len(data), 1 if at else len(data))
+            for at, label in enumerate(labels)
+        ]
+        layout = make("std_msgs/msg/MultiArrayLayout", dimensions, 0)
+        return self._messages[row].encode(BYTES, make(BYTES, layout, np.frombuffer(data, np.uint8)))
+
+    def _publish_messages(self, row: int, messages: Sequence[RelayedMessage]) -> None:
+        for message in messages:
+            self._publish(row, self._received_name(message.sender, message.topic), message.data)
+
+    def _publish(self, row: int, topic: str, payload: bytes) -> None:
+        utc_ns = self._clock.utc_ns()
+        for publisher in self._publishers.get((row, topic), ()):
+            if publisher.has_subscribers:
+                publisher.put(payload, utc_ns)
