@@ -20,6 +20,7 @@ from examples.loss_sweep import FLOCK, LOSSES, table
 from examples.protocol.runner import BROADCAST, TAG, VERSION
 from swarmwire.agent.behaviours.flocking import Heading
 from swarmwire.comms.base import sentinels
+from swarmwire.comms.robot.packets import Fate
 from swarmwire.comms.wire import frames
 from swarmwire.deploy import Result, Simulation, repeat, run
 from swarmwire.deploy.runs.config import Listening
@@ -33,7 +34,7 @@ LAMP = EXAMPLES / "ways" / "lamp.toml"
 PROGRAM = EXAMPLES / "protocol" / "runner.py"
 OWN = 3  # robots that it plays
 ROOT = Path(__file__).parents[3]
-EXAMPLE = ROOT / "examples" / "ros2" / "drive_and_turn.py"
+NODES = ROOT / "examples" / "ros2"
 STAND_IN = ROOT / "tests" / "support" / "examples" / "ros2" / "stand_in"
 PACE = 2.0
 SCENARIO = """
@@ -208,18 +209,18 @@ def test_foreign_program_is_recorded_so_that_repeat_gives_the_same_run(tmp_path:
 
 
 @contextmanager
-def node(transport: str, endpoint: str, namespace: str, scanner_deg: float) -> Generator[subprocess.Popen[str]]:
-    """The example in a process of its own, interrupted in the end as by Ctrl-C."""
-    paths = os.pathsep.join([str(STAND_IN), str(ROOT)])
-    arguments = ["--ros-args", "-r", f"__ns:={namespace}", "-p", f"scanner_deg:={scanner_deg}"]
+def node(example: str, transport: str, endpoint: str, namespace: str, *parameters: str) -> Generator[list[str]]:
+    """The example in a process of its own, interrupted in the end as by Ctrl-C; gets the lines of its log then."""
+    paths, log = os.pathsep.join([str(STAND_IN), str(ROOT)]), list[str]()
     environment = {**os.environ, "PYTHONPATH": paths, "ROS_STAND_IN": f"{transport} {endpoint}"}
-    command = [sys.executable, str(EXAMPLE), *arguments]
-    process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+    command = [sys.executable, str(NODES / example), "--ros-args", "-r", f"__ns:={namespace}", *parameters]
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
-        yield process
+        yield log
     finally:
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=30)
+        output, errors = process.communicate(timeout=30)
+        log += output.splitlines()
         assert (process.returncode, errors) == (0, "")
 
 
@@ -232,8 +233,9 @@ def test_ros2_example_drives_ahead_and_turns_before_walls(body, scanner_deg, tmp
     with Simulation(tmp_path / "two.toml", gateways="ros2", realtime=PACE) as simulation:
         assert simulation.served
         endpoints = [robot.address for robot in simulation.served.robots]
-        by_rmw = node("rmw", endpoints[0], "/flock_0", scanner_deg)
-        with by_rmw, node("bridge", endpoints[1], "/flock_1", scanner_deg):
+        scanner = ("-p", f"scanner_deg:={scanner_deg}")
+        by_rmw = node("drive_and_turn.py", "rmw", endpoints[0], "/flock_0", *scanner)
+        with by_rmw, node("drive_and_turn.py", "bridge", endpoints[1], "/flock_1", *scanner):
             gone_m, turned_rad = np.zeros(2), np.zeros(2)
             while not ((gone_m > 0.15).all() and (turned_rad > 0.5).all()):
                 assert simulation.tick < simulation.plan.ticks, f"driven {gone_m} m, turned {turned_rad} rad"
@@ -243,3 +245,30 @@ def test_ros2_example_drives_ahead_and_turns_before_walls(body, scanner_deg, tmp
                 gone_m += np.hypot(by[:, 0], by[:, 1])
                 turned_rad += np.abs(np.remainder(by[:, 2] + np.pi, 2 * np.pi) - np.pi)
                 assert np.abs(simulation.world.pose[:, :2]).max() < 1.3, "it drove into a wall"
+
+
+def test_ros2_nodes_count_together_over_the_radio(tmp_path):
+    """One starts later, and goes on from the count that it hears of the other."""
+    text = SCENARIO.replace("BODY", "turtlebot3-burger") + "[radio]\nrange_m = 5.0\nmeasures = { range = {} }\n"
+    (tmp_path / "two.toml").write_text(text)
+    (tmp_path / "idle.py").write_text(IDLE)
+    with Simulation(tmp_path / "two.toml", gateways="ros2", realtime=1.0) as simulation:
+
+        def step_until(received: int) -> None:
+            done = 0
+            while done < received:
+                truth = simulation.step()
+                done += int(truth.tally.fates[0, Fate.RECEIVED]) if truth.tally else 0
+                assert simulation.tick < simulation.plan.ticks
+
+        assert simulation.served
+        endpoint = simulation.served.robots[0].address
+        with node("count_over_radio.py", "rmw", endpoint, "/flock_0") as first_log:
+            step_until(3)
+            with node("count_over_radio.py", "bridge", endpoint, "/flock_1") as second_log:
+                step_until(8)
+    counts = [int(line.split()[0]) for line in first_log]
+    assert counts == sorted(counts)
+    assert counts[-1] > len(counts) + 1  # more than it can have counted by itself
+    assert all(" from flock_1 range_m=2" in line for line in first_log)  # the bases are 2 m apart
+    assert all(" from flock_0 range_m=2" in line for line in second_log)

@@ -15,6 +15,7 @@ from swarmwire.comms.base.clock import NS_PER_S, WallClock
 
 HASHES = {
     "geometry_msgs/msg/Twist": "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
+    "std_msgs/msg/UInt8MultiArray": "RIHS01_5687e861b8d307a5e48b7515467ae7a5fc2daf805bd0ce6d8e9e604bade9f385",
     "sensor_msgs/msg/LaserScan": "RIHS01_64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828",
 }
 
@@ -73,6 +74,11 @@ class Publisher:
         self.publish = publish
 
 
+class Logger:
+    def info(self, text: str) -> None:
+        print(text, flush=True)
+
+
 class Parameter:
     def __init__(self, value: float) -> None:
         self.value = value
@@ -91,6 +97,9 @@ class Node:
 
     def declare_parameter(self, name: str, default: float) -> Parameter:
         return Parameter(float(self.given.get(name, default)))
+
+    def get_logger(self) -> Logger:
+        return Logger()
 
     def create_publisher(self, kind: type[Any], topic: str, qos: object) -> Publisher:
         return Publisher(self._wire.publisher(kind, topic))
