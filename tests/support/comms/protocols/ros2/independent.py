@@ -30,14 +30,14 @@ class MultiArrayDimension(IdlStruct, typename="std_msgs/msg/MultiArrayDimension"
 
 @dataclass
 class MultiArrayLayout(IdlStruct, typename="std_msgs/msg/MultiArrayLayout"):
-    dim: sequence[MultiArrayDimension] = field(default_factory=list)
+    dim: sequence[MultiArrayDimension] = field(default_factory=list)  # pyright: ignore[reportAssignmentType]
     data_offset: uint32 = 0
 
 
 @dataclass
 class UInt8MultiArray(IdlStruct, typename="std_msgs/msg/UInt8MultiArray"):
     layout: MultiArrayLayout = field(default_factory=MultiArrayLayout)
-    data: sequence[uint8] = field(default_factory=list)
+    data: sequence[uint8] = field(default_factory=list)  # pyright: ignore[reportAssignmentType]
 
 
 @dataclass
