@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.held_positions import edge_of, received
+from benchmarks.relay import delivery
 from benchmarks.report_cost import write_campaign
 from benchmarks.table import rows
 from benchmarks.targets import TARGETS, Target, most
@@ -32,6 +33,14 @@ def test_benchmark_campaign_is_complete_and_readable(tmp_path):
     campaign = CampaignFolder(tmp_path)
     assert (campaign.finished, len(campaign.points), len(campaign.responses)) == (True, 50, 10)
     assert campaign.sample("stop_time_s", 45).censored > 0.0
+
+
+def test_benchmark_of_relayed_maps_has_the_loss_to_the_power_of_the_parts():
+    """Over the medium, with its collisions: about one broadcast of 300 by the table in docs/ros2-radio.md."""
+    best_effort, reliable = (delivery(0.3, reliable=reliable, sending_s=10) for reliable in (False, True))
+    assert best_effort.parts == 3
+    assert best_effort.delivered == pytest.approx(0.7**3, abs=4 * (0.7**3 * (1 - 0.7**3) / 900) ** 0.5)
+    assert reliable.delivered > 0.99
 
 
 @pytest.mark.parametrize(("rate_hz", "arrives"), [(10, [True, False]), (1000, [False, True])])

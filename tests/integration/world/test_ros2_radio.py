@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zenoh
+from zenoh.ext import HistoryConfig, declare_advanced_subscriber
 
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.sentinels import BROADCAST
@@ -33,11 +34,15 @@ NAMES = ("flock-0", "flock-1", "flock-2")
 TOPICS = [
     {"name": "map", "type": "geometry_msgs/msg/PoseStamped", "reliable": True},
     {"name": "report", "type": "geometry_msgs/msg/Twist", "to": ["flock-1"]},
+    {"name": "plan", "type": "geometry_msgs/msg/Twist", "latched": True},
 ]
 MESSAGE = independent.PoseStamped(
     independent.header(5, "a frame with a long name" * 20),
     independent.Pose(independent.Point(1.0, 2.0, 3.0), independent.Quaternion(0.0, 0.0, 0.0, 1.0)),
 ).serialize()
+
+
+GO = independent.twist(1.0, 2.0).serialize()
 
 
 def scenario_with(**tables: Any):
@@ -137,7 +142,7 @@ def test_relayed_topic_reaches_the_namespace_of_each_receiver_under_its_sender(a
         assert [list(samples) for samples in robots] == [[MESSAGE], [MESSAGE]]
         assert crossed == [(0, to, size) for size in (200, 200, len(MESSAGE) + 33 - 400) for to in (1, 2)]
         assert flock.cross()[0] == []  # what is received is not relayed again
-        (report, _) = flock.radio.report()
+        report = flock.radio.report()[0]
         assert (report.messages, report.intended, report.received, report.lost) == (1, 2, 2, 0)
         assert (report.packets, report.bytes, report.requests) == (3, len(MESSAGE) + 33, 0)
         assert [robot.received for robot in report.robots.values()] == [0, 1, 1]
@@ -146,8 +151,8 @@ def test_relayed_topic_reaches_the_namespace_of_each_receiver_under_its_sender(a
 def test_relayed_topic_to_named_robots_reaches_these_alone():
     with gateway_air("rmw") as flock:
         samples = flock.subscribe("flock_1/radio/flock_2/report", independent.Twist)
-        flock.publish("flock_2/report", independent.Twist, independent.twist(1.0, 2.0).serialize())
-        flock.publish("flock_1/report", independent.Twist, independent.twist(1.0, 2.0).serialize())
+        flock.publish("flock_2/report", independent.Twist, GO)
+        flock.publish("flock_1/report", independent.Twist, GO)
         assert flock.until_received(samples) == [(2, 1, 52 + 11)]
         assert flock.radio.report()[1].intended == 1
 
@@ -203,6 +208,19 @@ def test_radio_topics_count_what_they_cannot_send():
         assert flock.radio.counts() == {f"ros2_radio_{name}": count for name, count in counts.items()}
 
 
+@pytest.mark.parametrize("transport", ["rmw", "bridge"])
+def test_latched_topic_is_received_by_late_subscribers(transport):
+    with gateway_air(transport) as flock:
+        key = "flock_0/radio/flock_2/plan" if transport == "bridge" else "0/flock_0/radio/flock_2/plan/**"
+        flock.publish("flock_2/plan", independent.Twist, GO)
+        until(lambda: flock.cross()[0])
+        samples: deque[zenoh.Sample] = deque()
+        history = HistoryConfig(detect_late_publishers=True, max_samples=100)
+        subscriber = declare_advanced_subscriber(flock.node, key, samples.append, history=history)
+        assert until(lambda: samples)[0].payload.to_bytes() == GO
+        subscriber.undeclare()
+
+
 def test_relayed_topics_appear_in_the_graph_of_ros():
     with gateway_air("rmw") as flock:
         replies = flock.node.liveliness().get("@ros2_lv/0/**/radio/**")
@@ -237,6 +255,12 @@ def test_relay_needs_a_radio_with_room_for_a_part():
     for radio in (small, None):
         with refused_input("maps.toml", "ros2.relay"):
             scenario_with(radio=radio)
+
+
+def test_relay_of_too_many_received_topics_is_refused():
+    names = [f"flock-{row}" for row in range(40)]
+    with refused_input("maps.toml", "ros2.relay.topics"):
+        RosRadio(scenario_with(), names, range(40), WallClock())  # 2 x 40 x 39, and 39
 
 
 def test_relay_of_a_type_that_is_unknown_is_refused():

@@ -3,6 +3,8 @@
 `Subscription` subscribes to a topic and `Publisher` publishes to one, each with or without rmw_zenoh's attachment.
 """
 
+# pyright: reportUnknownMemberType=false
+
 import json
 import re
 from collections.abc import Callable
@@ -112,6 +114,27 @@ class Subscription:
                 self._on_fault(error.fault)
                 return
         self._on_payload(sample.payload.to_bytes())
+
+
+class UndeclaredPublisher:
+    """A publisher that the network does not know of: it costs nothing until it sends, as befits one of thousands.
+
+    Attributes:
+        has_subscribers: always True.
+    """
+
+    def __init__(self, session: zenoh.Session, key: str, token: str | None) -> None:
+        """See `Publisher`."""
+        self._session, self._key = session, key
+        self._id = None if token is None else publisher_id(token)
+        self._sequence, self.has_subscribers = 0, True
+
+    def put(self, payload: bytes, utc_ns: int) -> None:
+        """See `Publisher.put`."""
+        self._sequence += 1
+        attached = None if self._id is None else attachment(self._sequence, utc_ns, self._id)
+        drop = zenoh.CongestionControl.DROP
+        self._session.put(self._key, payload, congestion_control=drop, attachment=attached)
 
 
 class Publisher:

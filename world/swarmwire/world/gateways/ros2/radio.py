@@ -7,7 +7,7 @@ become messages. It subscribes to exact names only, none of which it publishes t
 from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -30,7 +30,7 @@ from swarmwire.comms.protocols.ros2.keys import (
     rmw_key,
     ros_name,
 )
-from swarmwire.comms.protocols.ros2.links import Publisher, Subscription
+from swarmwire.comms.protocols.ros2.links import Publisher, Subscription, UndeclaredPublisher
 from swarmwire.comms.protocols.ros2.messages import Messages
 from swarmwire.comms.protocols.ros2.relay import REQUEST, RelayedMessage, RelayedTopic, RelayPacket, RobotRelay
 from swarmwire.comms.robot.messages import RELAY_TAG, RESERVED_TAGS
@@ -41,6 +41,7 @@ from swarmwire.world.scenario.scenario import Scenario
 RADIO_NODE = "radio"
 TX, RX = f"{RADIO_TOPICS}tx", f"{RADIO_TOPICS}rx"
 MAX_WAITING = 1024  # messages of nodes that wait for the loop
+MAX_RECEIVED_TOPICS = 2000  # the declaration of a token takes longer the more there are: 2,000 take some seconds
 FOLLOWS = 4  # looks for missing parts in the time after which they are requested
 LATCHED = Qos(depth=1, latched=True)
 
@@ -76,7 +77,10 @@ class RosRadio:
     """The topics on the radio of all robots that have topics."""
 
     def __init__(self, scenario: Scenario, names: Sequence[str], rows: Sequence[int], clock: DatedClock) -> None:
-        """`names` are those of all robots, `rows` those that have topics; the scenario has a radio."""
+        """`names` are those of all robots, `rows` those that have topics; the scenario has a radio.
+
+        BadInput for too many topics.
+        """
         assert scenario.radio
         self._source, self._table, self._clock = scenario.source, scenario.ros2.relay, clock
         self._names, self._ros_names = tuple(names), tuple(map(ros_name, names))
@@ -86,6 +90,10 @@ class RosRadio:
             {row for name in topic.to for row in groups.get(name) or (self._row_of[name],)} or set(rows)
             for topic in self._table.topics
         ]
+        received = sum(len(rows) - 1 for receivers in self._receivers for row in rows if row in receivers)
+        if received > MAX_RECEIVED_TOPICS:
+            expected = f"expected at most {MAX_RECEIVED_TOPICS} received topics, one for each receiver and sender"
+            raise BadInput(scenario.source, "ros2.relay.topics", f"{expected}, got {received}: `to` lowers them")
         self._relays: dict[int, RobotRelay] = {}
         for row in rows:
             to = [tuple(sorted(receivers - {row})) for receivers in self._receivers]
@@ -97,7 +105,7 @@ class RosRadio:
                 topics, scenario.radio.max_payload_bytes, retry_after_ns, self._table.retries
             )
         self._messages: dict[int, Messages] = {}  # by row
-        self._publishers: dict[tuple[int, str], list[Publisher]] = defaultdict(list)  # by row and topic
+        self._publishers = defaultdict[tuple[int, str], list[Publisher | UndeclaredPublisher]](list)  # by row and topic
         self._declared: list[object] = []  # zenoh undeclares unreferenced ones
         self._inbox = BoundedInbox[Callable[[], None]](MAX_WAITING)
         self._packets: dict[int, list[RelayPacket]] = {}  # by row: packets of `radio/tx`
@@ -134,10 +142,13 @@ class RosRadio:
                 endpoint = way, full, kind, type_hash, qos
                 token = node.topic_token(number, *endpoint) if rmw else bridge_token(node.zid, *endpoint)
                 key = rmw_key(node.domain, full, kind, type_hash if way == WRITE else "*") if rmw else bridge_key(full)
+                rmw_token = token if rmw else None
                 if accept:
                     self._declared.append(self._subscribe(session, key, accept, attached=rmw))
+                elif name == RX or qos.latched:
+                    self._publishers[row, name].append(Publisher(session, key, rmw_token, qos))
                 else:
-                    self._publishers[row, name].append(Publisher(session, key, token if rmw else None, qos))
+                    self._publishers[row, name].append(UndeclaredPublisher(session, key, rmw_token))
                 tokens.append(token)
         self._declared += [session.liveliness().declare_token(token) for token in tokens]
 
@@ -151,17 +162,18 @@ class RosRadio:
         if not len(received):
             return received
         is_relay = received.payloads.tags()[received.payload] == RELAY_TAG
-        payloads = {row: received.payloads.row(row) for row in set(received.payload.tolist())}
+        data = cache(received.payloads.row)  # receivers share the bytes of a packet
         for index in np.flatnonzero(is_relay).tolist():
             row = int(received.receiver[index])
             if row in self._relays:
-                sender, payload = int(received.sender_index[index]), payloads[int(received.payload[index])]
+                sender, payload = int(received.sender_index[index]), data(int(received.payload[index]))
                 self._publish_messages(row, self._relays[row].receive(sender, payload, now_ns))
-        for index in np.flatnonzero(~is_relay).tolist():
-            row = int(received.receiver[index])
-            if any(publisher.has_subscribers for publisher in self._publishers.get((row, RX), ())):
-                self._publish(row, RX, self._received_bytes(row, received, index, payloads))
-        return received.select(np.flatnonzero(~is_relay)) if is_relay.any() else received
+        others = received.select(np.flatnonzero(~is_relay)) if is_relay.any() else received
+        if listening := [row for row in self._relays if self._has_subscribers(row, RX)]:
+            for index in np.flatnonzero(np.isin(others.receiver, listening)).tolist():
+                payload = self._received_bytes(others, index, data(int(others.payload[index])))
+                self._publish(int(others.receiver[index]), RX, payload)
+        return others
 
     def pop_packets(self) -> list[SentPackets]:
         """See `PacketPorts`."""
@@ -265,21 +277,24 @@ class RosRadio:
         else:
             self._packets.setdefault(row, []).append(RelayPacket(to, data))
 
-    def _received_bytes(self, row: int, received: ReceivedPackets, index: int, payloads: dict[int, bytes]) -> bytes:
+    def _received_bytes(self, received: ReceivedPackets, index: int, data: bytes) -> bytes:
         """Return a message of a received packet: its bytes, and the sender and measurements as names of dimensions."""
-        make, data = self._messages[row].make, payloads[int(received.payload[index])]
+        messages = self._messages[int(received.receiver[index])]
         labels = [self._ros_names[int(received.sender_index[index])]]
         labels += [f"{name}={column[index]:.9g}" for name, column in received.measured.items()]
         dimensions: list[Any] = [
-            make("std_msgs/msg/MultiArrayDimension", label, 1 if at else len(data), 1 if at else len(data))
-            for at, label in enumerate(labels)
+            messages.make("std_msgs/msg/MultiArrayDimension", label, size, size)
+            for label, size in zip(labels, (len(data), *(1 for _ in labels[1:])), strict=True)
         ]
-        layout = make("std_msgs/msg/MultiArrayLayout", dimensions, 0)
-        return self._messages[row].encode(BYTES, make(BYTES, layout, np.frombuffer(data, np.uint8)))
+        layout = messages.make("std_msgs/msg/MultiArrayLayout", dimensions, 0)
+        return messages.encode(BYTES, messages.make(BYTES, layout, np.frombuffer(data, np.uint8)))
 
     def _publish_messages(self, row: int, messages: Sequence[RelayedMessage]) -> None:
         for message in messages:
             self._publish(row, self._received_name(message.sender, message.topic), message.data)
+
+    def _has_subscribers(self, row: int, topic: str) -> bool:
+        return any(publisher.has_subscribers for publisher in self._publishers.get((row, topic), ()))
 
     def _publish(self, row: int, topic: str, payload: bytes) -> None:
         utc_ns = self._clock.utc_ns()
