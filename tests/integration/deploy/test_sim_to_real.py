@@ -12,7 +12,7 @@ import tomli_w
 from swarmwire.deploy import run
 from swarmwire.deploy.campaigns.sweep import sweep
 from tests.support.deploy.runs import LOSSY, called
-from tests.support.metrics.real_logs import METRICS, SMALL, as_logs, flock, watched
+from tests.support.metrics.real_logs import METRICS, SMALL, as_bag, as_logs, flock, watched
 
 
 @pytest.fixture(scope="module")
@@ -162,3 +162,87 @@ def test_latencies_that_are_not_uniform_are_drawn_and_become_a_table(tmp_path, m
     assert (code, errors) == (0, "")
     assert tomllib.loads(out[out.index("# Fitted to ") :])["radio"]["delays"]["distribution"] == "lognormal"
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+OSCILLATING = [*SMALL, 'metrics=["speed", "order", "oscillation", "link_pdr", "latency_air"]']
+POSES = ("--poses", "/{name}/pose")
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory):
+    """A run, the logs that its robots would have written, and a bag with the same content."""
+    here = tmp_path_factory.mktemp("bags")
+    logs = as_logs(watched(*OSCILLATING[len(SMALL) :], out=here / "run"), here / "logs")
+    return here / "run", logs, as_bag(logs, here / "bag")
+
+
+def table(path):
+    with path.open() as file:
+        return list(csv.reader(file))
+
+
+def test_bag_of_robots_is_compared_as_their_logs_are(bags, tmp_path, monkeypatch, capsys):
+    run, logs, bag = bags
+    for source, to in ((logs, "logs.csv"), (bag, "bag.csv")):
+        topics = POSES if source == bag else ()
+        code, _, errors = called(monkeypatch, capsys, "sim-to-real", run, source, *topics, "--to", tmp_path / to)
+        assert (code, errors) == (0, "")
+    of_logs, of_bag = table(tmp_path / "logs.csv"), table(tmp_path / "bag.csv")
+    assert {"speed", "order", "oscillation", "link_pdr", "latency_air"} <= {row[0] for row in of_bag}
+    for expected, row in zip(of_logs, of_bag, strict=True):
+        for value, found in zip(expected, row, strict=True):
+            try:
+                assert float(found) == pytest.approx(float(value), rel=1e-4, abs=1e-5, nan_ok=True)
+            except ValueError:
+                assert found == value
+
+
+def test_radio_fitted_to_a_bag_is_that_of_the_logs(bags, monkeypatch, capsys):
+    _, logs, bag = bags
+    tables = []
+    for source, topics in ((logs, ()), (bag, POSES)):
+        code, out, _ = called(monkeypatch, capsys, "radio", "fit", source, *topics)
+        assert code == 0
+        tables.append(tomllib.loads(out[out.index("# Fitted") :])["radio"])
+    of_logs, of_bag = tables
+    assert of_bag.keys() == of_logs.keys()
+    assert of_bag["loss"] == of_logs["loss"]
+    assert of_bag["latency_s"] == pytest.approx(of_logs["latency_s"], abs=1e-5)
+
+
+def test_what_a_bag_lacks_is_left_out_and_said(bags, tmp_path, monkeypatch, capsys):
+    run, logs, _ = bags
+    bag = as_bag(logs, tmp_path / "poses", commands=False, packets=False)
+    code, out, _ = called(monkeypatch, capsys, "sim-to-real", run, bag, *POSES)
+    assert code == 0
+    rows = {line.split()[0] for line in out.splitlines() if line}
+    assert {"speed", "order"} <= rows
+    assert not rows & {"oscillation", "link_pdr", "latency_air", "packets", "total"}
+    assert re.search("note: no packets.*\nnote: no commands", out)
+
+    blind = as_bag(logs, tmp_path / "blind", commands=False)
+    out = called(monkeypatch, capsys, "sim-to-real", run, blind)[1]  # /NAME/odom, which is not there
+    rows = {line.split()[0] for line in out.splitlines() if line}
+    assert {"latency_air", "total"} <= rows
+    assert not rows & {"speed", "order"}
+
+
+@pytest.mark.parametrize(
+    ("options", "text", "where"),
+    [
+        (("--poses", "/pose"), None, "--poses"),
+        (("--poses", "/{name}/gps"), None, "--poses"),
+        (("--packets", "/{name}/radio"), None, "--packets"),
+        ((), '{"t_s": 1.0}', "message 1 of /flock_0/packets"),
+        ((), '{"t_s": 1.0, "seq": -1}', "message 1 of /flock_0/packets"),
+        ((), "seq 7", "message 1 of /flock_0/packets"),
+    ],
+)
+def test_topics_and_packets_that_cannot_be_read_are_refused(bags, options, text, where, tmp_path, monkeypatch, capsys):
+    bag = bags[2]
+    if text is not None:
+        bag = as_bag(bags[1], tmp_path / "bad", first_text=text)
+    code, _, errors = called(monkeypatch, capsys, "radio", "fit", bag, *options)
+    assert code != 0
+    assert where in errors
+    assert errors.count("\n") == 1

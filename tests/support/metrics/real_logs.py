@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
 from swarmwire.comms.base.clock import to_s
 from swarmwire.comms.observe.interfaces import Observer
@@ -19,6 +20,7 @@ BEGAN_S = 1_767_225_600.0
 TICKS = "tick,t_s,late,x_m,y_m,heading_rad,drive,linear_mps,angular_radps,state,value,charge"
 RECEIVED = "t_s,tx,rx,seq,to,size_bytes,tag,latency_s,distance_m,given"
 SENT = "t_s,tx,seq,to,size_bytes,tag,fate"
+FILES = ("ticks", "sent", "received")
 SMALL = ("duration_s=20", "robots.flock.count=6", "arena.size_m=[6.0, 6.0]", "arena.obstacles=[]")
 METRICS = 'metrics=["speed", "cohesion", "link_pdr", "latency_air"]'
 
@@ -134,3 +136,53 @@ def watched(*overrides: str, seed: int = 1, out: Path | None = None) -> Watched:
 def flock() -> Watched:
     """The same run for all tests: everybody is in range."""
     return watched("radio.range_m=20")
+
+
+def as_bag(logs: Path, to: Path, *, commands: bool = True, packets: bool = True, first_text: str = "") -> Path:
+    """Write a bag of ROS 2 from the logs of a swarm: /NAME/pose, and by default /NAME/cmd_vel and /NAME/packets.
+
+    A packet's text has no latency: it follows from the times of both ends.
+    """
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    make: dict[str, Any] = {name.rpartition("/")[2]: kind for name, kind in store.types.items() if "/msg/" in name}
+    messages: list[tuple[int, str, str, Any]] = []
+    for folder in sorted(logs.iterdir()):
+        name = folder.name.replace("-", "_")
+        ticks, sent, received = (
+            pl.read_csv(folder / f"{part}.csv", infer_schema=False).fill_null("").to_dicts() for part in FILES
+        )
+        for row in ticks:
+            at_ns = round(float(row["t_s"]) * 1e9)
+            header, turn = make["Header"](make["Time"](*divmod(at_ns, 10**9)), "map"), float(row["heading_rad"]) / 2.0
+            where = make["Point"](float(row["x_m"]), float(row["y_m"]), 0.0)
+            pose = make["Pose"](where, make["Quaternion"](0.0, 0.0, np.sin(turn), np.cos(turn)))
+            messages.append(
+                (at_ns, f"/{name}/pose", "geometry_msgs/msg/PoseStamped", make["PoseStamped"](header, pose))
+            )
+            ahead, left = (
+                make["Vector3"](*part)
+                for part in ((float(row["linear_mps"]), 0.0, 0.0), (0.0, 0.0, float(row["angular_radps"])))
+            )
+            if commands:
+                messages.append((at_ns, f"/{name}/cmd_vel", "geometry_msgs/msg/Twist", make["Twist"](ahead, left)))
+        for row in (*sent, *received) if packets else ():
+            text: dict[str, Any] = {
+                "t_s": float(row["t_s"]),
+                "seq": int(row["seq"]),
+                "size_bytes": int(row["size_bytes"]),
+            }
+            text |= {
+                key: row[key].replace("-", "_") for key in ("tx", "to") if row[key] and (key == "to" or "rx" in row)
+            }
+            said, first_text = make["String"](first_text or json.dumps(text)), ""
+            messages.append((round(float(row["t_s"]) * 1e9), f"/{name}/packets", "std_msgs/msg/String", said))
+    with Writer(to, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topics: dict[str, Any] = {}
+        for at_ns, topic, kind, message in sorted(messages, key=lambda entry: entry[0]):
+            if topic not in topics:
+                topics[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(topics[topic], at_ns, store.serialize_cdr(message, kind))
+    return to / f"{to.name}.mcap"

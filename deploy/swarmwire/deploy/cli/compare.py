@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from swarmwire.deploy.cli.options import BagPackets, BagPoses
+
 CAMPAIGN_HELP = "A campaign's folder; FOLDER@radio.loss=0.4 is that part of it."
 
 
@@ -103,7 +105,10 @@ def sim_to_real_command(
         ),
     ],
     log: Annotated[
-        Path, typer.Argument(help="Folder with a folder per robot, or that of one robot.", metavar="REAL_LOG")
+        Path,
+        typer.Argument(
+            help="Folder with a folder per robot, or that of one robot, or a bag of ROS 2.", metavar="REAL_LOG"
+        ),
     ],
     to: Annotated[
         list[Path] | None,
@@ -113,6 +118,8 @@ def sim_to_real_command(
             metavar="FILE",
         ),
     ] = None,
+    poses: BagPoses = None,
+    packets: BagPackets = None,
 ) -> None:
     """Compare a log of real robots with simulated runs: the same metrics side by side, and their differences.
 
@@ -123,6 +130,7 @@ def sim_to_real_command(
 
       swarmwire sim-to-real campaigns/lab logs/monday --to sim-to-real.html
     """
+    from swarmwire.deploy.cli.actions.bag_logs import BagTopics
     from swarmwire.deploy.cli.actions.sim_to_real import compare_with_logs
 
-    compare_with_logs(emulated, log, to or [])
+    compare_with_logs(emulated, log, to or [], BagTopics(poses, packets))

@@ -104,6 +104,21 @@ Port = Annotated[
     int | None, typer.Option(help="Port of the page for a browser. Default: a free one.", min=1, max=65535)
 ]
 WithParent = Annotated[bool, typer.Option("--with-parent", hidden=True, help="End when standard input is closed.")]
+BagPoses = Annotated[
+    str | None,
+    typer.Option(
+        "--poses",
+        help="Of a bag: topics of Odometry or PoseStamped, or topic, parent and frame of transforms, as in "
+        '"/tf map {name}/base_link". Default: /{name}/odom.',
+        metavar="TOPIC",
+    ),
+]
+BagPackets = Annotated[
+    str | None,
+    typer.Option(
+        "--packets", help="Of a bag: topics of the robots' packets. Default: /{name}/packets.", metavar="TOPIC"
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from swarmwire.deploy.cli.options import AsJson, Overrides, Seed, with_options
+from swarmwire.deploy.cli.options import AsJson, BagPackets, BagPoses, Overrides, Seed, with_options
 
 radio_app = typer.Typer(
     help="Probe an emulated radio without a run, or fit one to logs of real robots.",
@@ -20,7 +20,7 @@ def fit_command(
         Path,
         typer.Argument(
             help="CSV or Parquet with t_s, tx, rx, seq, rssi_dbm, and tx_x_m, tx_y_m, rx_x_m, rx_y_m or distance_m; "
-            "or a folder of robots' logs, or a CSV of theirs, without rssi_dbm.",
+            "or a folder of robots' logs, or a CSV of theirs, without rssi_dbm; or a bag of ROS 2.",
             metavar="FILE",
         ),
     ],
@@ -37,6 +37,8 @@ def fit_command(
     within: Annotated[
         float | None, typer.Option(help="Use only packets over at most this distance, in m.", metavar="M")
     ] = None,
+    poses: BagPoses = None,
+    packets: BagPackets = None,
 ) -> None:
     """Fit a radio's parameters to a log of real robots: path loss, shadowing, and losses, single or in bursts.
 
@@ -47,9 +49,11 @@ def fit_command(
     Robots' networks report no signal strength: range, losses and latencies are fitted to their logs, and the delivery
     of each link is printed. Every row is a packet that arrived; a packet sent without such a row was lost.
     """
+    from swarmwire.deploy.cli.actions.bag_logs import BagTopics
     from swarmwire.deploy.cli.actions.radio_fit import fit_radio_file
 
-    fit_radio_file(file, to or [], power_dbm=power_dbm, gain_dbi=gain_dbi, within_m=within)
+    topics = BagTopics(poses, packets)
+    fit_radio_file(file, to or [], topics, power_dbm=power_dbm, gain_dbi=gain_dbi, within_m=within)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,7 +22,7 @@ T = TypeVar("T")
 
 ROUNDING = 1e-9  # 0.28 x 25 is a little more than 7 in floats
 Kind = Literal["level", "count", "time"]
-Need = Literal["poses", "contacts", "graph", "airtime", "latency"]  # latency: on air
+Need = Literal["poses", "commands", "contacts", "graph", "packets", "airtime", "latency"]  # latency: on air
 
 
 class Components(NamedTuple):

@@ -16,6 +16,7 @@ from swarmwire.metrics.real.real_log.truths import real_run
 from swarmwire.metrics.real.sim_to_real.runs import measured_log, missing_data
 from tests.support.metrics.real_logs import as_logs, flock
 
+LOGGED = {"poses", "commands", "packets", "latency"}  # what the logs of robots have
 NAMES = (
     "order",
     "order_velocity",
@@ -243,13 +244,15 @@ def test_measures_that_a_log_cannot_know_are_left_out_and_never_0(tmp_path):
 def test_metric_of_a_log_is_that_of_the_run_or_left_out_for_missing_data(name, real, of_run):
     metric = METRICS[name]()
     found = measures(real.static, real.truths(), [metric])
-    if missing_data(metric, has_poses=True) is not None:
+    if missing_data(metric, LOGGED) is not None:
         assert np.isnan(found).all()
     elif np.isfinite(of_run[name]).any():
         assert np.nanmean(found) == pytest.approx(np.nanmean(of_run[name]), rel=0.05, abs=0.05)
 
 
-@pytest.mark.parametrize("name", [name for name in METRICS if missing_data(METRICS[name](), has_poses=False) is None])
+@pytest.mark.parametrize(
+    "name", [name for name in METRICS if missing_data(METRICS[name](), LOGGED - {"poses"}) is None]
+)
 def test_metric_measured_without_poses_does_not_depend_on_them(name, real):
     metric, unknown = METRICS[name](), np.full_like(real._motion.pose, np.nan)
     blind = replace(real, _motion=replace(real._motion, pose=unknown, velocity=unknown))

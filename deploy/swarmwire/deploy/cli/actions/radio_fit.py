@@ -17,6 +17,7 @@ from swarmwire.comms.base.config import bounds_of, fault_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Antenna, Shadowing
+from swarmwire.deploy.cli.actions.bag_logs import BagTopics, is_bag, read_bag_logs
 from swarmwire.deploy.runs.scenario_parts import checked_radio
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.deploy.terminal.output import echo
@@ -49,7 +50,7 @@ HIGH_BIT_RATE_BPS = 1_000_000_000  # measured latencies include the time on air
 
 
 def fit_radio_file(
-    log: Path, files: Sequence[Path], *, power_dbm: float, gain_dbi: float, within_m: float | None
+    log: Path, files: Sequence[Path], topics: BagTopics, *, power_dbm: float, gain_dbi: float, within_m: float | None
 ) -> None:
     """Fit a radio to a log, print the fit, and write the table (.toml) or a drawing to files."""
     for path in files:
@@ -57,7 +58,7 @@ def fit_radio_file(
     if not log.exists():
         raise BadInput(str(log), "", "expected a log: there is no such file or folder")
     antenna = _antenna(power_dbm, gain_dbi)
-    fit = _fit(log, within_m)
+    fit = _fit(log, topics, within_m)
     text = fit_toml(fit, antenna, log)
     print_fit(fit, str(log), TerminalConsole())
     tables = [path for path in files if path.suffix.lower() == ".toml"]
@@ -82,9 +83,11 @@ def _antenna(power_dbm: float, gain_dbi: float) -> Antenna:
     return antenna
 
 
-def _fit(path: Path, within_m: float | None) -> RadioFit | NetworkFit:
-    """Return the fit of a table with signal strengths, or of robots' logs."""
-    if path.is_dir():
+def _fit(path: Path, topics: BagTopics, within_m: float | None) -> RadioFit | NetworkFit:
+    """Return the fit of a table with signal strengths, of robots' logs, or of a bag."""
+    if is_bag(path):
+        log = network_log_of_robots(read_bag_logs(path, topics))
+    elif path.is_dir():
         log = network_log_of_robots(read_real_logs(path))
     elif is_network_table(path):
         log = network_log_of_table(path)

@@ -16,7 +16,9 @@ from swarmwire.comms.base.atomic import check_output_path
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import file_of, with_file
 from swarmwire.comms.observe.truth import Static
+from swarmwire.comms.protocols.ros2.keys import ros_name
 from swarmwire.deploy.campaigns.store import CampaignWriter
+from swarmwire.deploy.cli.actions.bag_logs import BagTopics, is_bag, read_bag_logs
 from swarmwire.deploy.runs.scenario_parts import agent_specs, selected_metrics
 from swarmwire.deploy.terminal.console import TerminalConsole, print_rows
 from swarmwire.deploy.terminal.output import echo
@@ -46,11 +48,14 @@ from swarmwire.world.world import World
 MAX_NAMED = 3  # differing parameters in one line
 
 
-def compare_with_logs(emulated: str, log: Path, files: Sequence[Path]) -> None:
-    """Compare a log with a run or a campaign, print the comparison, and write it to files (.html or .csv)."""
+def compare_with_logs(emulated: str, log: Path, files: Sequence[Path], topics: BagTopics) -> None:
+    """Compare logs or a bag with a run or a campaign, print the comparison, and write it to files (.html or .csv)."""
     for path in files:
         check_output_path(path, (".html", ".csv"))
-    logs, emulation = read_real_logs(log), read_emulation(emulated)
+    bag = is_bag(log)
+    logs = None if bag else read_real_logs(log)
+    emulation = read_emulation(emulated)
+    logs = logs or _bag_logs(log, topics, emulation.static)
     shortest_s = min(run.duration_s for run in emulation.runs.runs)
     measured = measured_log(logs, emulation.metrics, emulation.static, shortest_s)
     comparison = compare_sim_to_real(emulation.runs, measured, emulation.metrics)
@@ -65,6 +70,16 @@ def compare_with_logs(emulated: str, log: Path, files: Sequence[Path]) -> None:
 
             write_report(sim_to_real_report(comparison, f"{emulation.runs.name} and {log.name}", notes), path)
         echo(f"written: {path}")
+
+
+def _bag_logs(bag: Path, topics: BagTopics, static: Static) -> RealLogs:
+    """Read a bag of robots with the bodies and the rate of the emulated ones."""
+    bodies = {
+        ros_name(static.robot_names[robot]): group.body
+        for group in static.groups
+        for robot in range(group.start, group.stop)
+    }
+    return read_bag_logs(bag, topics, bodies, static.rate_hz / static.groups[0].act_every_ticks)
 
 
 @dataclass(frozen=True)
@@ -111,6 +126,8 @@ def differing_settings(emulation: Emulation, logs: RealLogs) -> list[str]:
     if rates_hz != [logs.rate_hz]:
         text = " and ".join(f"{rate_hz:g} Hz" for rate_hz in rates_hz)
         lines.append(f"steps of the agents: {text} emulated, {logs.rate_hz:g} Hz in the log")
+    if not logs.robots[0].about.agent:  # a bag names neither agents nor bodies
+        return lines
     return [*lines, *_differing_agents(emulation, logs), *_differing_bodies(static, logs)]
 
 
@@ -157,7 +174,7 @@ def _differing_params(kind: type, emulated: Mapping[str, Any], robots: Sequence[
 
 def _differing_bodies(static: Static, logs: RealLogs) -> Iterator[str]:
     emulated = {group.body.name: group.body for group in static.groups}
-    logged = {robot.body.name: robot.body for robot in logs.robots}
+    logged = {robot.body.name: robot.body for robot in logs.robots if robot.body is not None}
     if emulated.keys() != logged.keys():
         yield f"body: {', '.join(sorted(emulated))} emulated, {', '.join(sorted(logged))} in the log"
     for name in emulated.keys() & logged.keys():

@@ -39,7 +39,7 @@ class AgeOfInformation(Metric):
     )
     unit = "s"
     standard = True
-    needs = ()
+    needs = ("packets",)
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
@@ -69,7 +69,7 @@ class PeakAgeOfInformation(WindowedMetric):
     name = "peak_age_of_information"
     help = "age of what a robot knew of another just before a newer packet came, mean over such updates in the window"
     unit = "s"
-    needs = ()
+    needs = ("packets",)
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

@@ -51,7 +51,7 @@ def reception_columns(records: ReceptionRecords) -> ReceptionColumns:
 class WindowedMetric(Metric):
     """A metric of the packets in a window of time that ends now."""
 
-    needs = ()
+    needs = ("packets",)
 
     window_s: float = parameter(1.0, help="length of the window; rounded up to whole ticks", unit="s", above=0.0)
 
@@ -148,7 +148,7 @@ class Throughput(Metric):
     help = "payload received by all robots together, a broadcast once for each, in bit/s"
     unit = "bit/s"
     standard = True
-    needs = ()
+    needs = ("packets",)
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:

@@ -107,7 +107,7 @@ class LatencyOnAir(_Latency):
 
     name = "latency_air"
     to_agent = False
-    needs = ("latency",)
+    needs = ("packets", "latency")
     help = "time from sending to hearing, mean over packets received in the last window_s, in s"
 
 

@@ -32,7 +32,7 @@ class Oscillation(Metric):
     name = "oscillation"
     help = "changes of the commanded turning side per robot-minute so far, in 1/min"
     unit = "1/min"
-    needs = ()
+    needs = ("commands",)
     bounds = (0.0, None)
 
     def begin(self, static: Static) -> Measure:
@@ -151,6 +151,7 @@ class Deadlocked(Metric):
 
     name = "deadlocked"
     help = "robots alive that were commanded to move over a window and did not / robots alive"
+    needs = ("poses", "commands")
     bounds = (0.0, 1.0)
 
     def begin(self, static: Static) -> Measure:

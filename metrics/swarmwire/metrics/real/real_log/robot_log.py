@@ -43,7 +43,7 @@ class AboutRobot:
     name: str
     swarm: str
     robots: tuple[str, ...]  # all robots of the swarm, by index
-    agent: str  # the robot's setting
+    agent: str  # the robot's setting; "": unknown, as are params and body
     agent_sha256: str
     params: dict[str, Any]
     body: dict[str, Any]  # data sheet
@@ -58,7 +58,7 @@ class Steps:
 
     time_s: FloatArray  # (n,) UTC since 1970
     pose: FloatArray  # (n, 3) x, y in m, heading in rad, tracker's frame; NaN: unknown
-    command: FloatArray  # (n, 2) forward m/s, left turn rad/s, input of the driver
+    command: FloatArray  # (n, 2) forward m/s, left turn rad/s, input of the driver; NaN: unknown
     state: list[str]  # (n,) "": none
     value: FloatArray  # (n,) NaN: none
 
@@ -111,7 +111,7 @@ class RealRobotLog:
     """The content of a robot's folder."""
 
     about: AboutRobot
-    body: Body
+    body: Body | None  # None: unknown
     where: str
     steps: Steps
     received: LoggedReceptions

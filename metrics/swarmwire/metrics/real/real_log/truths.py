@@ -169,6 +169,7 @@ def _groups(logs: RealLogs) -> Iterator[Group]:
     """Yield a group per run of consecutive robots with the same body."""
     start = 0
     for number, (body, robots) in enumerate(groupby(logs.robots, lambda robot: robot.body)):
+        assert body is not None, "only fits of a radio do without bodies"
         count = len(list(robots))
         yield Group(f"{body.name}-{number}", body, start, start + count)
         start += count

@@ -158,7 +158,7 @@ def compare_sim_to_real(emulated: EmulatedRuns, log: MeasuredLog, metrics: Seque
         elif metric.kind == "time":
             never.append(metric.name)
     rows.sort(key=lambda row: -row.badness)
-    numbers = list(radio_values(emulated, log, duration_s))
+    numbers = list(radio_values(emulated, log, duration_s)) if log.radio else []
     reason = uncovered_time(emulated, log, duration_s)
     has_radio = any(run.radio for run in emulated.runs)
     return SimToReal(

@@ -1,7 +1,7 @@
 """The compared data: logs of real robots and emulated runs, with the same metrics tick by tick."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -31,6 +31,8 @@ LACKS: dict[Need, str] = {
     "airtime": "times on air are not in the log",
     "latency": "the robots used the radio of a run, where they know only latencies to the agent: see latency_agent",
     "poses": "poses are not in the log: no tracker",
+    "commands": "commands are not in the log",
+    "packets": "packets are not in the log",
 }
 
 
@@ -131,7 +133,7 @@ class MeasuredLog:
     static: Static
     duration_s: float
     series: dict[str, FloatArray]  # `Metrics.values` by metric, (ticks,); NaN: undefined
-    radio: dict[str, Any]  # a summary's radio
+    radio: dict[str, Any]  # a summary's radio; empty without packets
     has_air: bool  # packets were sent over the radio of a run, so their latencies are those to the agent
     left_out: dict[str, str]  # missing data by metric
     notes: tuple[str, ...]
@@ -147,7 +149,14 @@ def measured_log(
     run = real_run(logs, scenery)
     ticks = math.floor(min(max_duration_s * run.base.rate_hz, run.base.ticks - 1) + 1e-6) + 1
     has_air = any(robot.about.radio.kind == WORLD for robot in logs.robots)
-    missing = {metric.name: missing_data(metric, has_poses=run.base.has_poses, has_air=has_air) for metric in metrics}
+    has_packets = any(len(robot.sent.time_s) + len(robot.received.time_s) for robot in logs.robots)
+    available: dict[Need, bool] = {
+        "poses": run.base.has_poses,
+        "commands": not any(np.isnan(robot.steps.command).any() for robot in logs.robots),
+        "packets": has_packets,
+        "latency": not has_air,
+    }
+    missing = {metric.name: missing_data(metric, {need for need in available if available[need]}) for metric in metrics}
     measures = Metrics([metric for metric in metrics if missing[metric.name] is None])
     tally = RadioTally()
     for observer in (measures, tally):
@@ -161,14 +170,13 @@ def measured_log(
         static=run.static,
         duration_s=(ticks - 1) / run.base.rate_hz,
         series={metric.name: values[:, index] for index, metric in enumerate(measures.metrics)},
-        radio=tally.end(run.under_way(ticks))["radio"][0],
+        radio=tally.end(run.under_way(ticks))["radio"][0] if has_packets else {},
         has_air=has_air,
         left_out={name: data for name, data in missing.items() if data is not None},
         notes=run.notes,
     )
 
 
-def missing_data(metric: Metric, *, has_poses: bool, has_air: bool = False) -> str | None:
-    """Return the data that a log lacks for a metric; None: complete. `has_air`: packets went over a run's radio."""
-    available: set[Need] = {*(("poses",) if has_poses else ()), *(() if has_air else ("latency",))}
+def missing_data(metric: Metric, available: Set[Need]) -> str | None:
+    """Return the data that a log lacks for a metric; None: complete."""
     return next((LACKS[need] for need in metric.needs if need not in available), None)
