@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
+from PIL import Image
 from typer.testing import CliRunner, Result
 
 from swarmwire.comms.base.errors import AgentFailed, BadInput
@@ -27,6 +29,7 @@ from swarmwire.deploy.runs.record.folder import RunWriter
 from swarmwire.deploy.runs.record.inputs import WITHIN, RecordedBackend
 from swarmwire.deploy.runs.record.provenance import PARTS, module_digests
 from swarmwire.metrics.records.run_folder.layout import DIGEST_BYTES, DIGESTS, INPUTS
+from swarmwire.world.scenario.arena import MapTable
 from swarmwire.world.scenario.motion import TraceMotion
 from swarmwire.world.scenario.scenario import same_content
 from swarmwire.world.scenario_file import load_scenario
@@ -126,7 +129,7 @@ def test_scenario_that_is_shipped_survives_python_and_being_written(tmp_path, sc
     if changed.radio is not None and changed.radio.trace is not None:  # it lies in the folder now
         trace = replace(changed.radio.trace, file=f"files/{changed.radio.trace.file}")
         changed = changed.model_copy(update={"radio": replace(changed.radio, trace=trace)})
-    if changed.arena.map is not None:
+    if isinstance(changed.arena.map, MapTable):
         table = changed.arena.map.model_copy(update={"image": f"files/{changed.arena.map.image}"})
         changed = changed.model_copy(update={"arena": changed.arena.model_copy(update={"map": table})})
     robots = dict(changed.robots)
@@ -138,6 +141,20 @@ def test_scenario_that_is_shipped_survives_python_and_being_written(tmp_path, sc
             robots[name] = table.model_copy(update={"motion": motion})
     assert same_content(again, changed.model_copy(update={"robots": robots}))
     assert not same_content(again, as_read)
+
+
+def test_nav2_map_is_copied_with_its_picture(tmp_path, mine):
+    (mine.parent / "maps").mkdir()
+    Image.new("L", (80, 80), 254).save(mine.parent / "maps" / "hall.pgm")
+    keys = {"image": "hall.pgm", "resolution": 0.05, "origin": [-2, -2, 0], "negate": 0}
+    (mine.parent / "hall.yaml").write_text(
+        yaml.safe_dump({**keys, "image": "maps/hall.pgm", "occupied_thresh": 0.65, "free_thresh": 0.196})
+    )
+    run(mine, overrides=["arena.map=hall.yaml"], out=tmp_path / "run")
+    shutil.rmtree(mine.parent)
+    roles = copied(tmp_path / "run")
+    assert (roles["files/hall.yaml"], roles["files/hall.pgm"]) == ("map", "map")
+    assert repeat(tmp_path / "run").same
 
 
 def test_agent_files_are_copied_and_the_originals_are_not_needed(tmp_path, mine):

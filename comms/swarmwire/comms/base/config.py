@@ -160,13 +160,14 @@ def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, 
         raise BadInput(str(path), "", f"expected TOML: {error}") from None
 
 
-def converted(kind: type[T], value: object, where: str) -> T:
+def converted(kind: type[T], value: object, where: str, strict: bool = True) -> T:
     """Convert a value of maps, lists and plain values to an instance of a typed class, with msgspec.
 
     BadInput names the file and the key that does not fit. Unknown keys are ignored, unless the class refuses them.
+    Unless `strict`, texts such as "0.05" are read as numbers where the class has these.
     """
     try:
-        return msgspec.convert(value, kind)
+        return msgspec.convert(value, kind, strict=strict)
     except msgspec.ValidationError as error:
         fault, _, path = str(error).partition(" - at `$")
         missing = MISSING_FIELD.fullmatch(fault)

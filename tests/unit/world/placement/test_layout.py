@@ -12,8 +12,9 @@ from PIL import Image
 
 from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.base.geometry.floor import Patch
-from swarmwire.world.placement import maps
+from swarmwire.world.placement import maps, pictures
 from swarmwire.world.placement.maps import merged_boxes
+from swarmwire.world.placement.pictures import read_grey
 from swarmwire.world.scenario_file import load_scenario, scenario_from
 from swarmwire.world.world import World
 from tests.support.refusals import refused_input
@@ -135,10 +136,10 @@ def test_grey_values_are_equal_in_all_picture_formats(tmp_path: Path) -> None:
     (tmp_path / "16.pgm").write_bytes(b"P5 16 16 65535\n" + (ramp.astype(">u2") * 257).tobytes())
     (tmp_path / "ascii.pgm").write_text("P2\n# a comment\n16 16 255\n" + " ".join(map(str, ramp.ravel())))
     for name in ("8.png", "rgb.png", "16.png", "16.pgm", "ascii.pgm"):
-        assert maps.read_grey(tmp_path / name, "f", "k") == pytest.approx(ramp / 255.0, abs=1e-6), name
+        assert read_grey(tmp_path / name, "f", "k") == pytest.approx(ramp / 255.0, abs=1e-6), name
     clear = np.dstack([np.zeros_like(ramp)] * 3 + [ramp])  # black, of rising opacity
     saved(tmp_path, "clear.png", clear)
-    assert maps.read_grey(tmp_path / "clear.png", "f", "k") == pytest.approx(1.0 - ramp / 255.0, abs=0.003)
+    assert read_grey(tmp_path / "clear.png", "f", "k") == pytest.approx(1.0 - ramp / 255.0, abs=0.003)
 
 
 def test_floor_has_its_picture_and_patches(tmp_path: Path) -> None:
@@ -179,7 +180,7 @@ def test_unusable_map_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert_refused(good, "at most 10000 m", "map.resolution_m", map={"resolution_m": 300.0})
     monkeypatch.setattr(maps, "MAX_BOXES", 2)
     assert_refused(good, "at most 2 boxes")
-    monkeypatch.setattr(maps, "MAX_PIXELS", 799)
+    monkeypatch.setattr(pictures, "MAX_PIXELS", 799)
     assert_refused(good, "at most 799 pixels")
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 100)
     assert_refused(good, "at most 799 pixels")

@@ -1,76 +1,36 @@
-"""The layout that all arenas of a scenario share: size, obstacles of the map image, floor.
+"""The layout that all arenas of a scenario share: size, obstacles of the map, floor.
 
-`read_grey` reads an image file as grey values. `merged_boxes` (compiled) merges the occupied pixels of a map into
-rectangles: few obstacles for engines, rays and the radio. `read_layout` builds the `Layout`.
+`read_layout` builds the `Layout`. A map is a picture, or one of Nav2 (`nav2_map.py`). `merged_boxes` (compiled) merges
+its occupied pixels into rectangles: few obstacles for engines, rays and the radio.
 """
 
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-from warnings import catch_warnings, simplefilter
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, IntArray
 from swarmwire.comms.base.config import folder_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
+from swarmwire.world.placement.nav2_map import Nav2Map, read_nav2_map
+from swarmwire.world.placement.pictures import MAX_PIXELS, read_grey
 from swarmwire.world.scenario.arena import ArenaTable, DiscPatchTable, GroundTable, MapTable
 
-if TYPE_CHECKING:
-    from PIL import Image
-
-FORMATS = ("PNG", "PPM", "BMP", "JPEG", "GIF")  # PGM is one of PPM's family
-MAX_PIXELS = 2**24
 MAX_BOXES = 10_000
 MAX_SIDE_M = 10_000.0
 
 UNKNOWN = np.float32(205) / np.float32(255)  # map_saver and SLAM write unknown cells so (nav2_map_server, map_io.cpp)
 
-GreyArray = NDArray[np.float32]
-
 
 def path_near_scenario(where: str, name: str) -> Path:
     """Return the path of a file that a scenario names, relative to the scenario's folder."""
     return folder_of(where) / name
-
-
-def read_grey(path: Path, where: str, key: str) -> GreyArray:
-    """Return the grey values of a picture, (rows, columns), 0 black … 1 white, top row first, on a white background.
-
-    BadInput names `where` and `key` for a file that is no image, or has more than `MAX_PIXELS`.
-    """
-    from PIL import Image
-
-    too_large = BadInput(where, key, f"expected a picture of at most {MAX_PIXELS} pixels: {path}")
-    try:
-        with catch_warnings():
-            simplefilter("error", Image.DecompressionBombWarning)
-            with Image.open(path, formats=FORMATS) as image:
-                if image.width * image.height > MAX_PIXELS:
-                    raise too_large
-                return _greys(image)
-    except FileNotFoundError:
-        raise BadInput(where, key, f"expected a file beside the scenario: there is no {path}") from None
-    except (Image.DecompressionBombWarning, Image.DecompressionBombError):
-        raise too_large from None
-    except (OSError, ValueError, SyntaxError, EOFError, IndexError):  # Pillow raises all of these for broken files
-        raise BadInput(where, key, f"expected a picture, PNG, PGM, BMP, JPEG or GIF: {path}") from None
-
-
-def _greys(image: "Image.Image") -> GreyArray:
-    from PIL import Image
-
-    if image.mode.startswith("I"):  # 16 bits a pixel
-        return np.asarray(image, np.float32) / np.float32(65535)
-    if image.has_transparency_data:
-        white = Image.new("RGBA", image.size, "white")
-        image = Image.alpha_composite(white, image.convert("RGBA"))
-    return np.asarray(image.convert("L"), np.float32) / np.float32(255)
 
 
 def merged_boxes(occupied: BoolArray, max_boxes: int) -> IntArray:
@@ -135,7 +95,10 @@ class Layout:
 def read_layout(arena: ArenaTable, where: str) -> Layout:
     """Return the layout that an arena's table describes; BadInput for pictures that are unreadable or do not fit."""
     size_m, boxes = arena.size_m, ()
-    if arena.map is not None:
+    if isinstance(arena.map, str):
+        path = path_near_scenario(where, arena.map)
+        size_m, boxes = _place_map(read_nav2_map(path, where, "arena.map"), path, size_m, where)
+    elif arena.map is not None:
         size_m, boxes = _read_map(arena.map, size_m, where)
     assert size_m is not None  # checked by the table
     return Layout(size_m, boxes, _read_floor(arena.ground, where) if arena.ground else None)
@@ -143,7 +106,7 @@ def read_layout(arena: ArenaTable, where: str) -> Layout:
 
 def map_hint(arena: ArenaTable, where: str) -> str | None:
     """Return a line about a map whose unknown pixels, most of it, count as free, else None; see `read_layout`."""
-    if arena.map is None or arena.map.occupied_below > UNKNOWN:
+    if not isinstance(arena.map, MapTable) or arena.map.occupied_below > UNKNOWN:
         return None
     greys = read_grey(path_near_scenario(where, arena.map.image), where, "arena.map.image")
     share = float(np.isclose(greys, UNKNOWN, rtol=0.0, atol=1e-4).mean())
@@ -168,21 +131,41 @@ def _read_map(
     if occupied.all():
         expected = f"expected free space: no pixel is as bright as occupied_below = {table.occupied_below:g}"
         raise BadInput(where, key, f"{expected}: {path}")
+    height_m = inf if table.height_m is None else table.height_m
+    return size_m, _boxes(occupied, table.resolution_m, (0.0, 0.0, 0.0), height_m, (where, key))
+
+
+def _place_map(
+    grid: Nav2Map, path: Path, table_size_m: tuple[float, float] | None, where: str
+) -> tuple[tuple[float, float], tuple[Obstacle, ...]]:
+    """Return the size of the arena in m, by default that of the known cells, and boxes over all that is not free."""
+    if not grid.free.any():
+        raise BadInput(where, "arena.map", f"expected free cells: {path} has none")
+    size_m = table_size_m or grid.known_size_m()
+    if max(size_m) > MAX_SIDE_M or size_m[0] * size_m[1] > MAX_PIXELS * grid.resolution_m**2:
+        expected = f"expected an arena of at most {MAX_SIDE_M:g} m a side and {MAX_PIXELS} cells"
+        raise BadInput(where, "arena.map", f"{expected}, got {size_m[0]:g} x {size_m[1]:g} m: {path}")
+    blocked, centre = grid.blocked(size_m)
+    return size_m, _boxes(blocked, grid.resolution_m, centre, inf, (where, "arena.map"))
+
+
+def _boxes(
+    occupied: BoolArray, side_m: float, centre: tuple[float, float, float], height_m: float, named_by: tuple[str, str]
+) -> tuple[Obstacle, ...]:
+    """Return boxes over the occupied pixels of a picture, the pose of whose centre is x, y in m and yaw in rad."""
     merged = merged_boxes(occupied, MAX_BOXES)
     if len(merged) > MAX_BOXES:
-        expected = f"expected a picture that makes at most {MAX_BOXES} boxes: make it coarser, or free of specks"
-        raise BadInput(where, key, f"{expected}: {path}")
-    height_m, side_m = inf if table.height_m is None else table.height_m, table.resolution_m
-    return size_m, tuple(
-        Obstacle(
-            "box",
-            (column + 0.5 * wide - 0.5 * columns) * side_m,
-            (0.5 * rows - row - 0.5 * tall) * side_m,
-            size_m=(wide * side_m, tall * side_m),
-            height_m=height_m,
-        )
-        for row, column, tall, wide in merged.tolist()
-    )
+        expected = f"expected a map that makes at most {MAX_BOXES} boxes: make it coarser, or free of specks"
+        raise BadInput(*named_by, expected)
+    rows, columns = occupied.shape
+    x_m, y_m, yaw_rad = centre
+    c, s = portable.cos(yaw_rad), portable.sin(yaw_rad)
+    boxes = list[Obstacle]()
+    for row, column, tall, wide in merged.tolist():
+        along_m, up_m = (column + 0.5 * wide - 0.5 * columns) * side_m, (0.5 * rows - row - 0.5 * tall) * side_m
+        at_m = x_m + (c * along_m - s * up_m), y_m + (s * along_m + c * up_m)
+        boxes.append(Obstacle("box", *at_m, yaw_rad, size_m=(wide * side_m, tall * side_m), height_m=height_m))
+    return tuple(boxes)
 
 
 def _read_floor(table: GroundTable, where: str) -> Floor:

@@ -6,11 +6,11 @@ The docstring below each key is its description in the JSON schema.
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import Field, StringConstraints, field_validator, model_validator
+from pydantic import Discriminator, Field, StringConstraints, Tag, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from swarmwire.comms.base.geometry.shapes import Boundary
-from swarmwire.world.scenario.schema import UNFIT
+from swarmwire.world.scenario.schema import UNFIT, form_of
 from swarmwire.world.scenario.tables import Extents, Gap, Heading, Length, Point, RegionTable, ScenarioTable
 
 Corners = Annotated[tuple[Point, ...], Field(strict=False, json_schema_extra={"unit": "m"})]
@@ -157,6 +157,9 @@ class MapTable(ScenarioTable):
     """Height of the obstacles; default: infinite."""
 
 
+MapForms = Annotated[Annotated[ImageFile, Tag("string")] | Annotated[MapTable, Tag("object")], Discriminator(form_of)]
+
+
 class DiscPatchTable(ScenarioTable):
     """A round patch."""
 
@@ -203,15 +206,15 @@ class ArenaTable(ScenarioTable):
     """[arena]: a bounded plane with obstacles, lights and a floor; the origin is its centre."""
 
     size_m: Extents | None = None
-    """Full extents along x and y; default: the map's."""
+    """Full extents along x and y; default: the map's, for one of Nav2 those of its known cells."""
     boundary: Boundary = "walls"
     """Walls that bodies hit and sensors see; nothing; or a torus: opposite sides meet, for bodies without contacts."""
     obstacles: tuple[Annotated[ObstacleTable, Field(discriminator="shape")], ...] = Field(default=(), strict=False)
     """Objects that bodies hit, sensors see and that block radio signals."""
     lights: tuple[LightTable, ...] = Field(default=(), strict=False)
     """Lights that sensors see."""
-    map: MapTable | None = None
-    """More obstacles, from a picture."""
+    map: MapForms | None = None
+    """More obstacles: the YAML file of a Nav2 map, relative to the scenario, or the table of a picture."""
     ground: GroundTable | None = None
     """The floor; default: white."""
 

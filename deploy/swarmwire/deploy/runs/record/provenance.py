@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
+import yaml
 
 from swarmwire.comms.base.atomic import make_subfolder, write_bytes, write_text
 from swarmwire.comms.base.config import folder_of, from_toml, read_json
@@ -192,9 +193,11 @@ def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
     for group in mapping["robots"].values():
         if "kind" in group.get("motion", {}):
             group["motion"]["kind"] = copies.class_of(group["motion"]["kind"], folder, "motion")
+    if isinstance(scenario.arena.map, str):
+        mapping["arena"]["map"] = _copied_nav2_map(path_near_scenario(scenario.source, scenario.arena.map), copies)
     for role in ("map", "ground"):
-        table = mapping["arena"].get(role, {})
-        if "image" in table:
+        table: Any = mapping["arena"].get(role, {})
+        if not isinstance(table, str) and "image" in table:
             table["image"] = copies.add(path_near_scenario(scenario.source, table["image"]).resolve(), role)
     return mapping
 
@@ -208,6 +211,14 @@ def _copied_body(sheet: Path, copies: "Copies") -> str:
             if "kind" in table:
                 table["kind"] = copies.class_of(table["kind"], sheet.parent, role).removeprefix(f"{FILES}/")
     return copies.add(sheet, "body", tomli_w.dumps(body).encode())
+
+
+def _copied_nav2_map(file: Path, copies: "Copies") -> str:
+    """Copy a map's picture, and its YAML file with the path of the copy; return its path within the run folder."""
+    content: dict[str, Any] = yaml.safe_load(file.read_text(encoding="utf-8"))
+    image = copies.add((file.parent / content["image"]).resolve(), "map")
+    content["image"] = image.removeprefix(f"{FILES}/")
+    return copies.add(file.resolve(), "map", yaml.safe_dump(content, sort_keys=False).encode())
 
 
 def changed_files(files: tuple[CopiedFile, ...], folder: Path) -> list[str]:
