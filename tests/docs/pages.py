@@ -49,7 +49,7 @@ def blocks_of(page: str, kind: str) -> list[Block]:
 
 def files_of(page: str) -> dict[str, str]:
     """What the page asks to save, by name."""
-    blocks = [block for kind in ("python", "toml") for block in blocks_of(page, kind)]
+    blocks = [block for kind in ("python", "toml", "xml") for block in blocks_of(page, kind)]
     return {block.file: block.text for block in blocks if block.file}
 
 

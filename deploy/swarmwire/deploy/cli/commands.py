@@ -20,6 +20,11 @@ COMMANDS = {
         "inspect:new_command",
         "Create a swarm's folder: an agent, a scenario with a lossy radio, a passing test, and a README.",
     ),
+    "import": CommandEntry(
+        RUN,
+        "inspect:import_command",
+        "Make a scenario, and the skeleton of its agents, from an ARGoS experiment; list what has no counterpart.",
+    ),
     "run": CommandEntry(
         RUN,
         "run:run_command",

@@ -1,4 +1,4 @@
-"""The commands `new`, `check`, `list`, `describe`, `schema` and `verify`."""
+"""The commands `new`, `import`, `check`, `list`, `describe`, `schema` and `verify`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -93,6 +93,25 @@ def new_command(
     from swarmwire.deploy.cli.actions.new import create_swarm
 
     create_swarm(name)
+
+
+def import_command(
+    experiment: Annotated[Path, typer.Argument(help="An experiment of ARGoS 3, a .argos file.", metavar="FILE")],
+    folder: Annotated[
+        Path, typer.Option("--out", help="Existing folder for the scenario and the agents' file.", metavar="FOLDER")
+    ] = Path(),
+) -> None:
+    """Make a scenario, and the skeleton of its agents, from an ARGoS experiment; list what has no counterpart.
+
+    For example:
+
+      swarmwire import experiments/foraging.argos
+
+      swarmwire run foraging.toml
+    """
+    from swarmwire.deploy.cli.actions.import_argos import import_argos
+
+    import_argos(experiment, folder)
 
 
 def verify_command(
