@@ -3,6 +3,7 @@
 import socket
 from contextlib import closing
 from functools import partial
+from typing import Any
 
 import pytest
 
@@ -10,12 +11,13 @@ from swarmwire.comms.base.clock import NEVER_NS as FOREVER_NS
 from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
-from swarmwire.comms.robot.tick_io import Actions, Readings
+from swarmwire.comms.robot.tick_io import NOTHING_SET, Actions, Readings
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.motion.live import FollowingBackend, LiveSource, wait_for_poses
 from swarmwire.world.motion.udp import UdpSource
 from swarmwire.world.scenario.motion import UdpMotion
-from tests.support.clocks import FakeClock, StillClock, until
+from tests.support.clocks import MS, FakeClock, StillClock, until
+from tests.support.world.mediums import ScriptedMedium
 from tests.support.world.poses import GivenPoses
 
 NAN = float("nan")
@@ -182,6 +184,25 @@ def test_first_poses_are_waited_for_and_those_of_tick_0() -> None:
     assert first.value.tolist() == [1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0]
     assert (second.rows.tolist(), second.value.tolist()) == ([4] * 4, [1.05, 0.0, 0.0, 0.0])
     assert backend.counts() == {"late": 3}
+
+
+def test_newest_poses_are_used_at_the_end_of_a_tick_by_a_loop_that_lags() -> None:
+    clock = FakeClock()
+    source, pace = given(clock), Pace(clock, 10, 1.0, lambda _: None)
+
+    class Lagging(StandingAgents):
+        def act_in_time(self, tick: int, *inputs: Any) -> Actions:
+            pace.begin()
+            for _ in range(5):  # poses come more often than the loop looks, which is 10 s behind
+                clock.time_ns += 2 * NS_PER_S
+                source.put("a-0", 1.0, 0.0, 0.0, 0.0)
+                inputs[-1].advance(50 * MS)
+            return Actions.joined([])
+
+    backend = FollowingBackend(Lagging(), [source], pace, MS, lambda: NOTHING_SET)
+    medium = ScriptedMedium()
+    actions = backend.act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
+    assert actions.poses.rows.tolist() == [4] * 4
 
 
 def test_source_without_any_pose_in_time_is_refused() -> None:

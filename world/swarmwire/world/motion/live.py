@@ -242,7 +242,7 @@ class FollowingBackend:
         start_ns, end_ns = (tick_start_ns(number, self._pace.rate_hz) for number in (tick, tick + 1))
         followed = _FollowedMedium(medium, start_ns, self._subtick_ns, self._pop_by)
         actions = timed.act_in_time(tick, readings, received, tx_status, followed)
-        followed.set_new(end_ns)
+        followed.set_new(end_ns, self._pop_new(self._pace.now_ns()))  # all: a loop that lags uses them, too
         return self._with_poses(actions, SparseTable.joined([NOTHING_SET if tick else self._first, *followed.poses]))
 
     def counts(self) -> dict[str, int]:
@@ -289,15 +289,15 @@ class _FollowedMedium:
         self._set_due(until_ns)
         return self._medium.advance(until_ns)
 
-    def set_new(self, at_ns: int) -> None:
-        """Set the poses that arrived by `at_ns`."""
-        if len(poses := self._pop_by(at_ns)):
+    def set_new(self, at_ns: int, poses: SparseTable) -> None:
+        """Set new poses, if there are any."""
+        if len(poses):
             self._medium.set_poses(at_ns, poses)
             self.poses.append(poses)
 
     def _set_due(self, until_ns: int) -> None:
         while self._next_ns <= until_ns:
-            self.set_new(self._next_ns)
+            self.set_new(self._next_ns, self._pop_by(self._next_ns))
             self._next_ns += self._subtick_ns
 
 
