@@ -51,7 +51,7 @@ COMMANDS = {
     "export": CommandEntry(
         VIEW,
         "export:export_command",
-        "Export a run as a picture, film, capture of its radio, table or motion trace; the suffix of the file decides.",
+        "Export a run as a picture, film, capture of its radio, recording, table or motion trace, by its suffix.",
     ),
     "draw": CommandEntry(
         VIEW,
