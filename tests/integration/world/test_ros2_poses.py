@@ -210,6 +210,9 @@ def test_source_is_a_subscriber_in_the_graph_of_ros():
         ("frame", {"type": TF, "frame": "base_link"}),
         ("connect", {"connect": ["127.0.0.1:7447"]}),
         ("listen", {"listen": ["tcp/192.0.2.1:7447"]}),
+        ("namespace", {"namespace": "/"}),
+        ("namespace", {"namespace": "/{index}"}),
+        ("namespace", {"namespace": "/robots"}),
     ],
 )
 def test_setting_that_cannot_be_used_is_refused(key, settings):

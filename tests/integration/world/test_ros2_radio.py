@@ -31,6 +31,7 @@ from tests.support.refusals import refused_input
 from tests.support.world.gateways import PROPER, turtlebot
 
 NAMES = ("flock-0", "flock-1", "flock-2")
+NAMESPACES = {row: f"/flock_{row}" for row in range(3)}
 TOPICS = [
     {"name": "map", "type": "geometry_msgs/msg/PoseStamped", "reliable": True},
     {"name": "report", "type": "geometry_msgs/msg/Twist", "to": ["flock-1"]},
@@ -109,7 +110,7 @@ def gateway_air(transport: str) -> Generator[Air]:
     gateway = Ros2Gateway(NAMES, turtlebot(), "", Ros2GatewayOptions(), WallClock())
     with closing(gateway):
         endpoint = gateway.open()[0]
-        radio = RosRadio(scenario_with(), NAMES, range(3), WallClock())
+        radio = RosRadio(scenario_with(), NAMES, NAMESPACES, WallClock())
         gateway.join(radio, 0)
         node = open_client(endpoint, 20.0)
         with closing(node):
@@ -119,11 +120,11 @@ def gateway_air(transport: str) -> Generator[Air]:
 
 @contextmanager
 def followed_air(transport: str) -> Generator[Air]:
-    motion = Ros2Motion(source="ros2", listen=["tcp/127.0.0.1:0"], transport=transport, namespace="/{name}")
-    source = Ros2Source(motion, NAMES, [0, 1, 2], (9.0, 9.0), WallClock())
+    motion = Ros2Motion(source="ros2", listen=["tcp/127.0.0.1:0"], transport=transport, namespace="/flock_{index}")
+    source = Ros2Source(motion, ["a-1", "a-2", "a-3"], [0, 1, 2], (9.0, 9.0), WallClock())
     source.open()
     with closing(source):
-        radio = RosRadio(scenario_with(), NAMES, range(3), WallClock())
+        radio = RosRadio(scenario_with(), NAMES, dict(enumerate(source.namespaces)), WallClock())
         source.join(radio)
         node = open_client(source.address.rpartition(" at ")[2], 20.0)
         with closing(node):
@@ -259,14 +260,15 @@ def test_relay_needs_a_radio_with_room_for_a_part():
 
 def test_relay_of_too_many_received_topics_is_refused():
     names = [f"flock-{row}" for row in range(40)]
+    namespaces = {row: f"/robot{row}" for row in range(40)}
     with refused_input("maps.toml", "ros2.relay.topics"):
-        RosRadio(scenario_with(), names, range(40), WallClock())  # 2 x 40 x 39, and 39
+        RosRadio(scenario_with(), names, namespaces, WallClock())  # 2 x 40 x 39, and 39
 
 
 def test_relay_of_a_type_that_is_unknown_is_refused():
     unknown = {"relay": {"topics": [{"name": "map", "type": "my_msgs/msg/Map"}]}}
     gateway = Ros2Gateway(NAMES, turtlebot(), "", Ros2GatewayOptions(), WallClock())
-    radio = RosRadio(scenario_with(ros2=unknown), NAMES, range(3), WallClock())
+    radio = RosRadio(scenario_with(ros2=unknown), NAMES, NAMESPACES, WallClock())
     with closing(gateway), refused_input("maps.toml", "ros2.relay.topics.0.type"):
         gateway.join(radio, 0)
 

@@ -27,19 +27,25 @@ def open_ros_radio(
 ) -> RosRadio | None:
     """Return the topics on the radio of all robots that have topics; None without such robots, or without a radio.
 
-    BadInput for types that are unknown. The topics end with the gateways and sources.
+    BadInput for types that are unknown, and for too many topics. The topics end with the gateways and sources.
     """
     followed = [source for source in sources if isinstance(source, Ros2Source)]
-    groups = [group for group in served.groups if isinstance(group.gateway, Ros2Gateway)] if served else []
-    if scenario.radio is None or not (followed or groups):
+    gateways = [
+        (group.rows.tolist(), group.gateway)
+        for group in (served.groups if served else ())
+        if isinstance(group.gateway, Ros2Gateway)
+    ]
+    if scenario.radio is None or not (followed or gateways):
         return None
-    behind = {row for group in groups for row in group.rows.tolist()}
-    followed = [source for source in followed if behind.isdisjoint(source.rows)]
-    rows = [*behind, *(row for source in followed for row in source.rows)]
-    radio = RosRadio(scenario, static.robot_names, sorted(rows), clock)
-    for group in groups:
-        if isinstance(group.gateway, Ros2Gateway):
-            group.gateway.join(radio, int(group.rows[0]))
+    namespaces: dict[int, str] = {}
+    for rows, gateway in gateways:
+        namespaces |= dict(zip(rows, gateway.namespaces, strict=True))
+    followed = [source for source in followed if namespaces.keys().isdisjoint(source.rows)]
+    for source in followed:
+        namespaces |= dict(zip(source.rows, source.namespaces, strict=True))
+    radio = RosRadio(scenario, static.robot_names, namespaces, clock)
+    for rows, gateway in gateways:
+        gateway.join(radio, rows[0])
     for source in followed:
         source.join(radio)
     return radio

@@ -35,14 +35,18 @@ CONNECT_S = 1.0  # duration of an attempt to connect, which delays the end of a 
 
 
 class Ros2Source(LiveSource):
-    """Subscribes to the topics of the group's robots at each endpoint."""
+    """Subscribes to the topics of the group's robots at each endpoint.
+
+    Attributes:
+        namespaces: the namespace of each robot's nodes; known from `open` on.
+    """
 
     motion: Ros2Motion
 
     def open(self) -> None:
         """Listen, and begin to connect; BadInput for names or endpoints that cannot be used, or without rosbags."""
         self._messages = Messages(self.motion.distro)
-        self._name_of = self._names_by_pose()
+        self._name_of, self.namespaces = self._names_by_pose(), self._namespaces()
         self._sessions: list[zenoh.Session] = []
         self._radio: RosRadio | None = None
         self._lock = Lock()  # of sessions and radio
@@ -69,27 +73,27 @@ class Ros2Source(LiveSource):
             close(session)
         self._sessions, self._tokens = [], []
 
-    def join(self, radio: RosRadio) -> None:
-        """Offer the robots' topics of the radio, in their namespaces; BadInput for names that cannot be used."""
-        radio.check(self._messages)
-        for name in (namespaces := self._namespaces()):
+    def _namespaces(self) -> list[str]:
+        names = [absolute("/", _filled(self.motion.namespace, name, at)) for at, name in enumerate(self.names)]
+        for name in names:
             check_name(name, "motion", "namespace")
-        if len(set(namespaces)) < len(namespaces):
+        if len(set(names)) < len(names):
             raise BadInput("motion", "namespace", "expected {name}, {index} or {number} in it: robots would share one")
+        return names
+
+    def join(self, radio: RosRadio) -> None:
+        """Offer the robots' topics of the radio, in their namespaces; BadInput for a type that is unknown."""
+        radio.check(self._messages)
         with self._lock:
             self._radio, sessions = radio, tuple(self._sessions)
         for session in sessions:
             self._offer(radio, session)
 
-    def _namespaces(self) -> list[str]:
-        names = (_filled(self.motion.namespace, name, index) for index, name in enumerate(self.names))
-        return [absolute("/", name) for name in names]
-
     def _offer(self, radio: RosRadio, session: zenoh.Session) -> None:
         is_rmw, zid = self.motion.transport == "rmw", str(session.zid())
         if not is_rmw:
             self._tokens.append(session.liveliness().declare_token(bridge_itself(zid)))
-        for index, (row, namespace) in enumerate(zip(self.rows, self._namespaces(), strict=True)):
+        for index, (row, namespace) in enumerate(zip(self.rows, self.namespaces, strict=True)):
             node = RmwNode(self.motion.domain, zid, 1 + index, namespace, RADIO_NODE)
             radio.join(row, session, node, self._messages, is_rmw=(is_rmw,))
 

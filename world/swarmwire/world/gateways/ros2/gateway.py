@@ -57,7 +57,7 @@ class Ros2Gateway(Gateway):
         check_endpoint(self.address, "ros2", "address")
         self._on_robot = address or ON_ROBOT
         self._options = options
-        self._namespaces = ros_names(names, "ros2")
+        self.namespaces = tuple(f"/{name}" for name in ros_names(names, "ros2"))
         self._messages = Messages(options.distro)
         self._broadcasters = broadcasters_of(body, len(names), options)
         self._rates = [ReadingRate(broadcaster.rate_hz) for broadcaster in self._broadcasters]
@@ -159,7 +159,7 @@ class Ros2Gateway(Gateway):
 
     def _base(self, session: zenoh.Session, index: int) -> Base:
         options = self._options
-        node = RmwNode(options.domain, str(session.zid()), index, f"/{self._namespaces[index]}", NODE)
+        node = RmwNode(options.domain, str(session.zid()), index, self.namespaces[index], NODE)
         inbox = CommandInbox(to_ns(options.cmd_timeout_s), self.clock)
         return Base(session, node, self._broadcasters, self._messages, inbox, stamped=options.stamped)
 

@@ -5,7 +5,7 @@ become messages. It subscribes to exact names only, none of which it publishes t
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
@@ -76,14 +76,17 @@ class RelayReport:
 class RosRadio:
     """The topics on the radio of all robots that have topics."""
 
-    def __init__(self, scenario: Scenario, names: Sequence[str], rows: Sequence[int], clock: DatedClock) -> None:
-        """`names` are those of all robots, `rows` those that have topics; the scenario has a radio.
+    def __init__(
+        self, scenario: Scenario, names: Sequence[str], namespaces: Mapping[int, str], clock: DatedClock
+    ) -> None:
+        """`names` are those of all robots; `namespaces` has, by row, those of robots with topics.
 
         BadInput for too many topics.
         """
         assert scenario.radio
         self._source, self._table, self._clock = scenario.source, scenario.ros2.relay, clock
-        self._names, self._ros_names = tuple(names), tuple(map(ros_name, names))
+        self._names, rows = tuple(names), sorted(namespaces)
+        self._ros_names = [namespaces.get(row, ros_name(name)).strip("/") for row, name in enumerate(names)]
         self._row_of = {name: row for kind in (self._names, self._ros_names) for row, name in enumerate(kind)}
         retry_after_ns, groups = to_ns(self._table.retry_after_s), scenario.groups()
         self._receivers = [
