@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 import zenoh
+from pycdr2 import IdlStruct
+from pycdr2.types import float64
 from zenoh.ext import HistoryConfig, declare_advanced_subscriber
 
 from swarmwire.comms.base.clock import WallClock
@@ -58,6 +60,17 @@ def scenario_with(**tables: Any):
         **tables,
     }
     return scenario_from(mapping, "maps.toml")
+
+
+@dataclass
+class OnlyX(IdlStruct, typename="my_msgs/msg/Point"):
+    x: float64
+
+
+@dataclass
+class Vector(IdlStruct, typename="my_msgs/msg/Vector"):
+    at: OnlyX
+    name: str
 
 
 @dataclass
@@ -265,11 +278,34 @@ def test_relay_of_too_many_received_topics_is_refused():
         RosRadio(scenario_with(), names, namespaces, WallClock())  # 2 x 40 x 39, and 39
 
 
-def test_relay_of_a_type_that_is_unknown_is_refused():
-    unknown = {"relay": {"topics": [{"name": "map", "type": "my_msgs/msg/Map"}]}}
+def test_relay_of_a_type_of_the_user_takes_its_definition_from_a_file(tmp_path):
+    """The hash is that of the definition by REP 2016, which the independent messages compute."""
+    file = tmp_path / "Vector.msg"
+    file.write_text("my_msgs/Point at\nstring name\n" + "=" * 80 + "\nMSG: my_msgs/Point\nfloat64 x\n")
+    topic = {"name": "at", "type": "my_msgs/msg/Vector", "definition": str(file)}
+    gateway = Ros2Gateway(NAMES, turtlebot(), "", Ros2GatewayOptions(), WallClock())
+    with closing(gateway):
+        session = open_client(gateway.open()[0], 20.0)
+        radio = RosRadio(scenario_with(ros2={"relay": {"topics": [topic]}}), NAMES, NAMESPACES, WallClock())
+        gateway.join(radio, 0)
+        replies = list(session.liveliness().get("@ros2_lv/0/**/my_msgs::msg::dds_::Vector_/**"))
+        close(session)
+    hashes = {str(reply.ok.key_expr).split("/")[11] for reply in replies if reply.ok}
+    assert hashes == {rihs01(Vector)}
+
+
+@pytest.mark.parametrize(
+    ("key", "text"), [("type", None), ("definition", ""), ("definition", "my_msgs/Other x"), ("definition", "int32")]
+)
+def test_relay_of_a_type_that_is_unknown_is_refused(key, text, tmp_path):
+    topic = {"name": "map", "type": "my_msgs/msg/Map"}
+    if text is not None:
+        topic["definition"] = str(tmp_path / "Map.msg")
+        (tmp_path / "Map.msg").write_text(text) if text else None
+    unknown = {"relay": {"topics": [topic]}}
     gateway = Ros2Gateway(NAMES, turtlebot(), "", Ros2GatewayOptions(), WallClock())
     radio = RosRadio(scenario_with(ros2=unknown), NAMES, NAMESPACES, WallClock())
-    with closing(gateway), refused_input("maps.toml", "ros2.relay.topics.0.type"):
+    with closing(gateway), refused_input("maps.toml", f"ros2.relay.topics.0.{key}"):
         gateway.join(radio, 0)
 
 

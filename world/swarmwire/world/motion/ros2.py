@@ -83,7 +83,7 @@ class Ros2Source(LiveSource):
 
     def join(self, radio: RosRadio) -> None:
         """Offer the robots' topics of the radio, in their namespaces; BadInput for a type that is unknown."""
-        radio.check(self._messages)
+        radio.prepare(self._messages)
         with self._lock:
             self._radio, sessions = radio, tuple(self._sessions)
         for session in sessions:

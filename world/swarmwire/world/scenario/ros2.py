@@ -12,6 +12,9 @@ class RelayedTopicTable(ScenarioTable):
     """Name in the robots' namespaces, such as "map": of /a/map robot b receives /b/radio/a/map."""
     type: str = Field(pattern=r"^\w+/msg/\w+$")
     """Type of the messages, such as nav_msgs/msg/OccupancyGrid."""
+    definition: str | None = Field(default=None, min_length=1)
+    """File with the definition of a type that rosbags does not know, as its .msg file; relative to the scenario. Other
+    such types in it follow, each after a line of 80 "=" and a line "MSG: package/Name"."""
     to: tuple[str, ...] = Field(default=(), strict=False)
     """Robots or groups that receive it, each by packets of its own; default: all, by broadcast."""
     reliable: bool = False

@@ -55,8 +55,18 @@ class Messages:
             self._store.register(get_types_from_msg(definition, kind))
 
     def has(self, kind: str) -> bool:
-        """Return True if the distribution has this kind of message."""
+        """Return True if this kind of message is known."""
         return kind in self._store.types
+
+    def add(self, kind: str, definition: str) -> None:
+        """Add a kind of message, and those whose definitions follow; BadFrame unless it is complete."""
+        from rosbags.typesys import TypesysError, get_types_from_msg
+
+        try:
+            self._store.register(get_types_from_msg(definition, kind))
+            self._store.hash_rihs01(kind)
+        except (TypesysError, KeyError) as error:
+            raise BadFrame("malformed", f"definition of {kind}: {error}") from None
 
     def make(self, kind: str, *fields: Any) -> Any:
         """Make a message with these fields, in the order of its definition."""

@@ -91,7 +91,7 @@ class Ros2Gateway(Gateway):
 
     def join(self, radio: RosRadio, first: int) -> None:
         """Offer the robots' topics of the radio, in their namespaces; `first` is the row of the first robot."""
-        radio.check(self._messages)
+        radio.prepare(self._messages)
         for index, base in enumerate(self._bases):
             node = replace(base.node, index=len(self._bases) + 1 + index, name=RADIO_NODE)
             radio.join(first + index, base.session, node, self._messages, is_rmw=(False, True))

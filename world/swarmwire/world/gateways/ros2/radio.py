@@ -14,6 +14,7 @@ import numpy as np
 import zenoh
 
 from swarmwire.comms.base.clock import DatedClock, to_ns
+from swarmwire.comms.base.config import folder_of
 from swarmwire.comms.base.errors import BadFrame, BadInput
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.protocols.ros2.keys import (
@@ -115,19 +116,27 @@ class RosRadio:
         self._counts, self._sent = Counter[str](), Counter[tuple[str, int, int]]()  # what, row, topic
         self._follow_ns, self._follow_after_ns = 0, retry_after_ns // FOLLOWS
 
-    def check(self, messages: Messages) -> None:
-        """Raise BadInput for a topic of a type that is not among these messages."""
+    def prepare(self, messages: Messages) -> None:
+        """Add the definitions of the topics' types to these messages; BadInput for a type that stays unknown."""
         for index, topic in enumerate(self._table.topics):
+            key = f"ros2.relay.topics.{index}"
+            if topic.definition and not messages.has(topic.type):
+                try:
+                    messages.add(topic.type, (folder_of(self._source) / topic.definition).read_text(encoding="utf-8"))
+                except (OSError, ValueError, BadFrame) as error:
+                    raise BadInput(
+                        self._source, f"{key}.definition", f"expected the type's .msg file: {error}"
+                    ) from None
             if not messages.has(topic.type):
-                expected = f"expected a type of ROS 2 {messages.distro} that rosbags knows, got {topic.type!r}"
-                raise BadInput(self._source, f"ros2.relay.topics.{index}.type", expected)
+                expected = f"expected a type of ROS 2 {messages.distro} that rosbags knows, or its `definition`"
+                raise BadInput(self._source, f"{key}.type", f"{expected}, got {topic.type!r}")
 
     def join(
         self, row: int, session: zenoh.Session, node: RmwNode, messages: Messages, *, is_rmw: Sequence[bool]
     ) -> None:
         """Offer the topics of a robot on a session, as `node`; safe to call from any thread.
 
-        `is_rmw` has True for rmw_zenoh and False for a bridge; `messages` are checked before.
+        `is_rmw` has True for rmw_zenoh and False for a bridge; `messages` are prepared.
         """
         self._messages[row] = messages
         topics = [(READ, TX, BYTES, DEFAULT_QOS, partial(self._transmit, row))]
