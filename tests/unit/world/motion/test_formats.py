@@ -188,6 +188,21 @@ def test_table_in_parquet_is_read_with_numbered_robots(tmp_path: Path) -> None:
     assert positions(trace, 0.5) == [[1.0, 0.0, 4.0], [2.0, 0.0, 4.0]]
 
 
+def test_table_may_be_sorted_by_time_or_robot_and_lack_what_is_zero(tmp_path: Path) -> None:
+    t_s, robot = np.repeat(np.arange(5), 3), np.tile(["c", "a", "b"], 5)
+    x_m, y_m = np.sin(np.arange(15.0)), np.cos(np.arange(15.0))
+    by_time = pl.DataFrame({"t_s": t_s, "robot": robot, "x_m": x_m, "y_m": y_m})
+    by_robot = by_time[[*range(0, 15, 3), *range(1, 15, 3), *range(2, 15, 3)]]
+    in_part = by_time[[*range(6), *range(6, 15, 3), *range(7, 15, 3), *range(8, 15, 3)]]
+    frames = by_time, by_robot, in_part, by_time.with_columns(z_m=0.0, heading_rad=None)
+    for number, frame in enumerate(frames):
+        frame.write_parquet(tmp_path / f"{number}.parquet")
+    first, *others = [read_trace(tmp_path / f"{number}.parquet") for number in range(len(frames))]
+    assert (first.names, first.first.tolist()) == (("c", "a", "b"), [0, 5, 10, 15])
+    assert first.x_m.tolist() == by_robot["x_m"].to_list()
+    assert all(equal(trace, first) for trace in others)
+
+
 @pytest.mark.parametrize("suffix", [".movements", ".movements.gz", ".csv", ".parquet"])
 @given(trace=traces())
 def test_round_trip_keeps_every_sample(

@@ -18,7 +18,7 @@ from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.math.compiled import atan2
 
 _wrap_angle = njit()(wrap_angle)
-T, X, Y, HEADING = 0, 1, 2, 4  # columns of samples: time, x, y, z, heading
+T, X, Y, HEADING = 0, 1, 2, 4  # columns of samples: time, x, y and, unless all lie in the plane, z, heading
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +35,8 @@ class MotionTrace:
 
     def shifted(self, dx_m: float, dy_m: float) -> "MotionTrace":
         """Return the trace with all positions moved by an offset."""
+        if not dx_m and not dy_m:
+            return self
         return replace(self, x_m=self.x_m + dx_m, y_m=self.y_m + dy_m)
 
     def samples(self) -> Iterator[FloatArray]:
@@ -70,7 +72,9 @@ class TracePoses:
     def __init__(self, trace: MotionTrace, order: Sequence[int], start_s: float) -> None:
         """`order`: index in the trace of each robot of the run; the run starts at `start_s` of the file."""
         self._start_s = start_s
-        columns = trace.t_s, trace.x_m, trace.y_m, trace.z_m, trace.heading_rad
+        columns = [trace.t_s, trace.x_m, trace.y_m]
+        if trace.z_m.any() or not np.isnan(trace.heading_rad).all():
+            columns += [trace.z_m, trace.heading_rad]
         robots = [slice(trace.first[robot], trace.first[robot + 1]) for robot in order]
         self._first = np.cumsum([0, *(part.stop - part.start for part in robots)], dtype=np.int64)
         # A sample's numbers are neighbours in memory: with an array of each, most accesses would miss the caches.
@@ -87,7 +91,7 @@ class TracePoses:
         Before its first sample and after its last one a robot stands there. A time before that of the last call is
         searched for from the start of the file.
         """
-        poses = np.empty((len(self._cursor), 4))
+        poses = np.zeros((len(self._cursor), 4))
         _interpolate(self._start_s + time_s, self._samples, self._first, self._cursor, self._direction_rad, poses)
         return poses
 
@@ -95,6 +99,7 @@ class TracePoses:
 @njit()
 def _interpolate(time_s, samples, first, cursor, direction_rad, poses):
     """Write the poses at a time of the file; cursors and directions move on with it."""
+    axes = min(samples.shape[1] - X, 3)
     for robot in range(len(cursor)):
         start, stop = first[robot], first[robot + 1]
         i, motion = cursor[robot], -1  # the last segment with a motion among those that begin since the last call
@@ -107,19 +112,21 @@ def _interpolate(time_s, samples, first, cursor, direction_rad, poses):
         if motion >= 0:
             dx, dy = samples[motion + 1, X] - samples[motion, X], samples[motion + 1, Y] - samples[motion, Y]
             direction_rad[robot] = atan2(dy, dx)
-        cursor[robot] = i
+        cursor[robot], heading = i, np.nan
         if start <= i < stop - 1:
             share = (time_s - samples[i, T]) / (samples[i + 1, T] - samples[i, T])
-            for axis in range(3):
+            for axis in range(axes):
                 position = samples[i, X + axis]
                 poses[robot, axis] = position + share * (samples[i + 1, X + axis] - position)
-            heading = samples[i, HEADING]
-            heading = _wrapped(heading + share * _wrapped(samples[i + 1, HEADING] - heading))
+            if axes == 3:
+                heading = samples[i, HEADING]
+                heading = _wrapped(heading + share * _wrapped(samples[i + 1, HEADING] - heading))
         else:
             i = max(i, start)
-            for axis in range(3):
+            for axis in range(axes):
                 poses[robot, axis] = samples[i, X + axis]
-            heading = _wrapped(samples[i, HEADING])
+            if axes == 3:
+                heading = _wrapped(samples[i, HEADING])
         poses[robot, 3] = direction_rad[robot] if np.isnan(heading) else heading
 
 
