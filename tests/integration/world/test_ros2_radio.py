@@ -158,7 +158,7 @@ def test_relayed_topic_reaches_the_namespace_of_each_receiver_under_its_sender(a
         assert flock.cross()[0] == []  # what is received is not relayed again
         report = flock.radio.report()[0]
         assert (report.messages, report.intended, report.received, report.lost) == (1, 2, 2, 0)
-        assert (report.packets, report.bytes, report.requests) == (3, len(MESSAGE) + 33, 0)
+        assert (report.packets, report.sent_bytes, report.requests) == (3, len(MESSAGE) + 33, 0)
         assert [robot.received for robot in report.robots.values()] == [0, 1, 1]
 
 

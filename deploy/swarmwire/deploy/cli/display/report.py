@@ -142,7 +142,7 @@ def _real_time_rows(result: Result) -> Iterator[tuple[str, str]]:
             yield "programs ended", ", ".join(f"{count} with {how}" for how, count in ends.items())
     for topic in result.relay:
         received = f"{topic.messages} messages, {topic.received} of {topic.intended} received"
-        yield f"topic {topic.topic}", f"{received}, {topic.bytes} bytes in {topic.packets} packets"
+        yield f"topic {topic.topic}", f"{received}, {topic.sent_bytes} bytes in {topic.packets} packets"
     if result.runners:
         late, stops = sum(real.late_answers.values()), sum(real.watchdog_stops.values())
         drops = f"{real.frames_dropped} frames with {real.packets_dropped} packets dropped"

@@ -281,7 +281,7 @@ def _after(use: dict[str, Any] | None) -> str:
 
 def _relayed(topic: dict[str, Any]) -> ReportTable:
     """Return a row per robot of a topic of ROS 2 that crossed the radio, with a row of totals."""
-    numbers = ("messages", "received", "packets", "bytes")
+    numbers = ("messages", "received", "packets", "sent_bytes")
     robots: dict[str, dict[str, int]] = {**topic["robots"], "all": topic}
     rows = tuple((name, *(f"{counts[key]:,}" for key in numbers)) for name, counts in robots.items())
     kind = f"reliable, {topic['repeated']:,} parts repeated on request" if topic["reliable"] else "best effort"
@@ -290,7 +290,8 @@ def _relayed(topic: dict[str, Any]) -> ReportTable:
         f"{topic['lost']:,} were lost. Messages are the robot's, received those of others. Packets and bytes are the "
         "payloads that its radio was to send, requests included."
     )
-    return ReportTable(("robot", *numbers), rows, caption, folded=len(rows) > _MAX_ROBOTS)
+    columns = ("robot", *numbers[:-1], "bytes")
+    return ReportTable(columns, rows, caption, folded=len(rows) > _MAX_ROBOTS)
 
 
 def _delay_cells(delay: dict[str, Any]) -> tuple[str, ...]:
