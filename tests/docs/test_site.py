@@ -76,7 +76,7 @@ def keys_of(schema: dict[str, Any]) -> Iterator[str]:
 
 
 def test_scenario_and_radio_pages_name_every_key_and_choice(site):
-    named = code(site, "scenario") | code(site, "radio-keys")
+    named = code(site, "scenario") | code(site, "radio-keys") | code(site, "ros2-radio")
     headed = {name.strip("[]").split(".")[0] for name in named if name.startswith("[")}  # [time], [robots.GROUP], …
     assert set(keys_of(scenario_schema())) <= named | headed
     assert {"time", "physics", "arena", "robots", "radio", "events", "run"} <= headed
