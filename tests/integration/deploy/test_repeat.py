@@ -143,17 +143,22 @@ def test_scenario_that_is_shipped_survives_python_and_being_written(tmp_path, sc
     assert not same_content(again, as_read)
 
 
-def test_nav2_map_is_copied_with_its_picture(tmp_path, mine):
+def test_nav2_map_with_its_picture_and_buildings_are_copied(tmp_path, mine):
     (mine.parent / "maps").mkdir()
     Image.new("L", (80, 80), 254).save(mine.parent / "maps" / "hall.pgm")
     keys = {"image": "hall.pgm", "resolution": 0.05, "origin": [-2, -2, 0], "negate": 0}
     (mine.parent / "hall.yaml").write_text(
         yaml.safe_dump({**keys, "image": "maps/hall.pgm", "occupied_thresh": 0.65, "free_thresh": 0.196})
     )
-    run(mine, overrides=["arena.map=hall.yaml"], out=tmp_path / "run")
+    (mine.parent / "yard.sdf").write_text(
+        """<sdf version="1.9"><model name="m"><static>true</static><pose>1 1 0 0 0 0</pose><link name="l">
+        <collision name="c"><geometry><box><size>0.5 0.5 1</size></box></geometry></collision></link></model></sdf>"""
+    )
+    run(mine, overrides=["arena.map=hall.yaml", "arena.buildings.file=yard.sdf"], out=tmp_path / "run")
     shutil.rmtree(mine.parent)
     roles = copied(tmp_path / "run")
     assert (roles["files/hall.yaml"], roles["files/hall.pgm"]) == ("map", "map")
+    assert roles["files/yard.sdf"] == "buildings"
     assert repeat(tmp_path / "run").same
 
 

@@ -19,7 +19,7 @@ from swarmwire.world.engines.physics import check_engines, engines_of
 from swarmwire.world.events.event import Event
 from swarmwire.world.events.robot_events import Impulse
 from swarmwire.world.placement.maps import read_layout
-from swarmwire.world.placement.occupancy import extent, heading_of, obstacle_at
+from swarmwire.world.placement.occupancy import heading_of, obstacle_at
 from swarmwire.world.scenario.arena import ObstacleTable
 from swarmwire.world.scenario.bodies import bodies_of
 from swarmwire.world.scenario.motion import TraceMotion
@@ -61,7 +61,7 @@ def _check_steps(scenario: Scenario, bodies: dict[str, Body], where: str) -> Non
 def _check_obstacle(extents_m: tuple[float, float], table: ObstacleTable, key: str, where: str) -> None:
     """Check that an obstacle with a position lies within the arena, or that a random obstacle fits into it."""
     size_m = np.array(extents_m)
-    low, high = extent(obstacle_at(table, *(table.at or (0.0, 0.0)), heading_of(table) or 0.0))
+    low, high = obstacle_at(table, *(table.at or (0.0, 0.0)), heading_of(table) or 0.0).extent_m
     fits = np.all(high - low <= size_m + 2e-9)
     if not fits or (table.at and (np.any(high > 0.5 * size_m + 1e-9) or np.any(low < -0.5 * size_m - 1e-9))):
         size = " x ".join(f"{side:g}" for side in size_m)

@@ -29,6 +29,7 @@ CLUSTER = Extra("swarmwire[cluster]", ("dask", "distributed"))
 CRAZYFLIE = Extra("swarmwire-agent[crazyflie]", ("cflib",))  # under the GPL
 FLEET = Extra("swarmwire[fleet]", ("asyncssh", "cryptography", "packaging", "pip"))
 LEARN = Extra("swarmwire[learn]", ("gymnasium", "pettingzoo"))
+MAPS = Extra("swarmwire-world[maps]", ("shapely",))
 MAVLINK = Extra("swarmwire[mavlink]", ("pymavlink",))
 MCAP = Extra("swarmwire[ros2]", ("mcap", "rosbags"))
 POLICY = Extra("swarmwire-agent[policy]", ("onnxruntime",))

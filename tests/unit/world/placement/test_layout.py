@@ -210,7 +210,7 @@ def test_placement_without_room_is_refused(path: str, value: Any, key: str, text
         World(scenario_from(mapping, "file.toml"), [1], {})
 
 
-def _hint(folder: Path, grey: NDArray[np.uint8], **table: float) -> tuple[str | None, World]:
+def _hint(folder: Path, grey: NDArray[np.uint8], **table: float) -> tuple[list[str], World]:
     """The hint of a map in a scenario of 20 robots, and its world."""
     arena = {"map": {"image": saved(folder, "slam.pgm", grey), "resolution_m": 0.05, **table}}
     robots = {"flock": {"body": "epuck", "count": 20, "agent": "swarmwire.agent.behaviours:Avoidance"}}
@@ -218,7 +218,7 @@ def _hint(folder: Path, grey: NDArray[np.uint8], **table: float) -> tuple[str | 
         {"format": 1, "name": "s", "seed": 1, "duration_s": 1.0, "arena": arena, "robots": robots},
         str(folder / "s.toml"),
     )
-    return maps.map_hint(scenario.arena, scenario.source), World(scenario, [1], {})
+    return maps.layout_hints(scenario.arena, scenario.source), World(scenario, [1], {})
 
 
 @pytest.mark.parametrize(("occupied_below", "free"), [(0.5, True), (0.8, True), (0.9, False)])
@@ -227,7 +227,7 @@ def test_unknown_cells_of_a_slam_map_are_free_with_a_hint_or_obstacles(tmp_path,
     grey[44:76, 44:76] = 0
     grey[45:75, 45:75] = 254  # a room of 1.5 m x 1.5 m, the middle of the arena
     hint, world = _hint(tmp_path, grey, occupied_below=occupied_below)
-    assert (hint is not None) == free
+    assert bool(hint) == free
     assert (np.abs(world.pose[..., :2]) < 0.75).all() != free
 
 
@@ -235,4 +235,4 @@ def test_unknown_cells_of_a_slam_map_are_free_with_a_hint_or_obstacles(tmp_path,
 def test_map_hint_names_unknown_cells_that_are_most_of_the_map(tmp_path, shade, rows, hinted):
     grey = np.full((20, 20), 254, np.uint8)
     grey[:rows] = shade
-    assert (_hint(tmp_path, grey)[0] is not None) == hinted
+    assert (_hint(tmp_path, grey)[0] != []) == hinted

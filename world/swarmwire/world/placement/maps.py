@@ -18,9 +18,10 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.floor import Floor, Patch, packed_image
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
+from swarmwire.world.placement.buildings import Buildings, read_buildings
 from swarmwire.world.placement.nav2_map import Nav2Map, read_nav2_map
 from swarmwire.world.placement.pictures import MAX_PIXELS, read_grey
-from swarmwire.world.scenario.arena import ArenaTable, DiscPatchTable, GroundTable, MapTable
+from swarmwire.world.scenario.arena import ArenaTable, BuildingsTable, DiscPatchTable, GroundTable, MapTable
 
 MAX_BOXES = 10_000
 MAX_SIDE_M = 10_000.0
@@ -85,34 +86,41 @@ def _rows(uncovered: AnyArray, row: int, column: int, columns: Any):
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Size, map and floor, the same in every arena; random obstacles are not part of it."""
+    """Size, map, buildings and floor, the same in every arena; other obstacles are not part of it."""
 
     size_m: tuple[float, float]
-    boxes: tuple[Obstacle, ...] = ()  # obstacles of the map
+    obstacles: tuple[Obstacle, ...] = ()  # of the map and the buildings
     floor: Floor | None = None
 
 
 def read_layout(arena: ArenaTable, where: str) -> Layout:
     """Return the layout that an arena's table describes; BadInput for pictures that are unreadable or do not fit."""
-    size_m, boxes = arena.size_m, ()
+    size_m, obstacles = arena.size_m, ()
     if isinstance(arena.map, str):
         path = path_near_scenario(where, arena.map)
-        size_m, boxes = _place_map(read_nav2_map(path, where, "arena.map"), path, size_m, where)
+        size_m, obstacles = _place_map(read_nav2_map(path, where, "arena.map"), path, size_m, where)
     elif arena.map is not None:
-        size_m, boxes = _read_map(arena.map, size_m, where)
+        size_m, obstacles = _read_map(arena.map, size_m, where)
+    if arena.buildings is not None:
+        size_m, buildings = _place_buildings(_buildings(arena.buildings, where).obstacles, size_m, where)
+        obstacles += buildings
     assert size_m is not None  # checked by the table
-    return Layout(size_m, boxes, _read_floor(arena.ground, where) if arena.ground else None)
+    return Layout(size_m, obstacles, _read_floor(arena.ground, where) if arena.ground else None)
 
 
-def map_hint(arena: ArenaTable, where: str) -> str | None:
-    """Return a line about a map whose unknown pixels, most of it, count as free, else None; see `read_layout`."""
-    if not isinstance(arena.map, MapTable) or arena.map.occupied_below > UNKNOWN:
-        return None
-    greys = read_grey(path_near_scenario(where, arena.map.image), where, "arena.map.image")
-    share = float(np.isclose(greys, UNKNOWN, rtol=0.0, atol=1e-4).mean())
-    if share <= 0.5:
-        return None
-    return f"{share:.0%} of arena.map is unknown (205 of 255) and free: occupied_below = 0.9 makes this obstacles"
+def layout_hints(arena: ArenaTable, where: str) -> list[str]:
+    """Return a line about what a user may not expect of the map, and one about parts of a file that are left out."""
+    hints: list[str] = []
+    if isinstance(arena.map, MapTable) and arena.map.occupied_below <= UNKNOWN:
+        greys = read_grey(path_near_scenario(where, arena.map.image), where, "arena.map.image")
+        share = float(np.isclose(greys, UNKNOWN, rtol=0.0, atol=1e-4).mean())
+        if share > 0.5:
+            text = "is unknown (205 of 255) and free: occupied_below = 0.9 makes this obstacles"
+            hints.append(f"{share:.0%} of arena.map {text}")
+    if arena.buildings is not None and (left_out := _buildings(arena.buildings, where).left_out):
+        counts = ", ".join(f"{count} x {kind}" for kind, count in left_out.items())
+        hints.append(f"arena.buildings leaves out {counts}")
+    return hints
 
 
 def _read_map(
@@ -147,6 +155,34 @@ def _place_map(
         raise BadInput(where, "arena.map", f"{expected}, got {size_m[0]:g} x {size_m[1]:g} m: {path}")
     blocked, centre = grid.blocked(size_m)
     return size_m, _boxes(blocked, grid.resolution_m, centre, inf, (where, "arena.map"))
+
+
+def _buildings(table: BuildingsTable, where: str) -> Buildings:
+    path = path_near_scenario(where, table.file)
+    return read_buildings(path, table.origin, table.height_m, (where, "arena.buildings"))
+
+
+def _place_buildings(
+    buildings: tuple[Obstacle, ...], table_size_m: tuple[float, float] | None, where: str
+) -> tuple[tuple[float, float], tuple[Obstacle, ...]]:
+    """Return the size of the arena in m, by default one that holds all buildings, and those that reach into it."""
+    if not buildings:
+        raise BadInput(where, "arena.buildings", "expected a file with a building")
+    low_m, high_m = (np.array(ends_m) for ends_m in zip(*(building.extent_m for building in buildings), strict=True))
+    farthest_m = 2.0 * np.maximum(np.abs(low_m), np.abs(high_m)).max(axis=0)
+    size_m = table_size_m or (round(float(farthest_m[0]), 6), round(float(farthest_m[1]), 6))
+    if max(size_m) > MAX_SIDE_M:
+        expected = f"expected size_m, or buildings within {0.5 * MAX_SIDE_M:g} m of the origin"
+        raise BadInput(where, "arena.buildings", f"{expected}: the farthest is at {0.5 * farthest_m.max():g} m")
+    half_m = 0.5 * np.array(size_m)
+    reaching: BoolArray = np.all((low_m < half_m) & (high_m > -half_m), axis=1)
+    inside = tuple(buildings[index] for index in np.flatnonzero(reaching))
+    if not inside:
+        expected = "expected buildings that reach into the arena; the origin is latitude, longitude"
+        raise BadInput(where, "arena.buildings", expected)
+    if len(inside) > MAX_BOXES:
+        raise BadInput(where, "arena.buildings", f"expected at most {MAX_BOXES} convex parts, got {len(inside)}")
+    return size_m, inside
 
 
 def _boxes(

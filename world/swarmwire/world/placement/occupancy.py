@@ -42,15 +42,6 @@ def heading_of(table: ObstacleTable) -> float | None:
     return None if isinstance(table, CylinderTable) else table.heading_rad
 
 
-def extent(obstacle: Obstacle) -> tuple[FloatArray, FloatArray]:
-    """Return the least and the greatest x, y of an obstacle, (2,) each, in m, arena frame."""
-    if obstacle.shape == "cylinder":
-        centre = np.array([obstacle.x_m, obstacle.y_m])
-        return centre - obstacle.radius_m, centre + obstacle.radius_m
-    corners = obstacle.corners_m
-    return corners.min(axis=0), corners.max(axis=0)
-
-
 class Occupancy(NamedTuple):
     """The obstacles and robots in an arena so far. Robots by cell: head[cell], then next_robot[robot], until NO_ROBOT.
 
@@ -203,18 +194,18 @@ def _polygon_clear_in_plane(occupancy, sides, gap_m):
 
 
 class PlacedObstacles:
-    """The obstacles of one arena so far, as arrays with room for all obstacles; those of the map are first."""
+    """The obstacles of one arena so far, as arrays with room for all; those of map and buildings are first."""
 
     def __init__(self, arena: ArenaTable, layout: Layout) -> None:
         self._size_m, self._wraps = layout.size_m, arena.boundary == "torus"
-        boxes = obstacle_arrays((layout.boxes,))
+        fixed = obstacle_arrays((layout.obstacles,))
         count = sum(table.count for table in arena.obstacles)
         sides = sum(_sides(table) * table.count for table in arena.obstacles)
-        self._circle = np.empty((count, 4))
-        self._polygon = np.concatenate([_with_top(boxes.polygon, boxes.polygon_top_m), np.empty((count, 4))])
-        self._side = np.concatenate([boxes.side, np.empty((sides, 5))])
-        self._side_start = np.concatenate([boxes.side_start, np.zeros(count, np.int64)])
-        self._circles, self._polygons = 0, len(boxes.polygon)
+        self._circle = np.concatenate([_with_top(fixed.circle, fixed.circle_top_m), np.empty((count, 4))])
+        self._polygon = np.concatenate([_with_top(fixed.polygon, fixed.polygon_top_m), np.empty((count, 4))])
+        self._side = np.concatenate([fixed.side, np.empty((sides, 5))])
+        self._side_start = np.concatenate([fixed.side_start, np.zeros(count, np.int64)])
+        self._circles, self._polygons = len(fixed.circle), len(fixed.polygon)
 
     def add(self, obstacle: Obstacle) -> Obstacle:
         """Add an obstacle, and return it."""

@@ -1,9 +1,9 @@
 """Placement: the obstacles, lights and robots of an arena at the start.
 
-The order is: the map, obstacles at a point, random obstacles, lights, robots. Candidate j of an entity is a draw keyed
-by the arena, the entity and j; the first free candidate becomes its position. So a robot's position depends on its
-arena's seed and on earlier entities, never on later ones. Lights have no body: they keep clear of obstacles, and only
-lights with a gap keep clear of lights. Robots keep clear of bodies that they could touch at their height.
+The order is: the map, buildings, obstacles at a point, random obstacles, lights, robots. Candidate j of an entity is a
+draw keyed by the arena, the entity and j; the first free candidate becomes its position. So a robot's position depends
+on its arena's seed and on earlier entities, never on later ones. Lights have no body: they keep clear of obstacles, and
+only lights with a gap keep clear of lights. Robots keep clear of bodies that they could touch at their height.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,7 +45,7 @@ NOTHING_FREE = f"none of {MAX_CANDIDATES} places tried is free"
 class Placement:
     """The initial obstacles, lights and poses of one arena."""
 
-    obstacles: tuple[Obstacle, ...]  # the map's boxes, then the file's obstacles, in its order
+    obstacles: tuple[Obstacle, ...]  # of the map, of buildings, then the file's obstacles, in its order
     lights: tuple[Light, ...]  # the file's lights, in its order
     pose: FloatArray  # (robots, 3) x, y in m, heading in rad, in (-pi, pi]
 
@@ -63,7 +63,7 @@ def place_arena(
     `starts` has the poses (count, 3) of groups that a source moves, which stand there in any case.
     """
     store = PlacedObstacles(scenario.arena, layout)
-    obstacles = (*layout.boxes, *_place_obstacles(scenario, store, seed, key))
+    obstacles = (*layout.obstacles, *_place_obstacles(scenario, store, seed, key))
     lights = _place_lights(scenario, store, seed, key)
     gaps_m = {group.name: _gap_m(scenario.robots[group.name].place) for group in groups}
     occupancy = store.occupancy(groups, max(gaps_m.values()))

@@ -16,7 +16,7 @@ from swarmwire.world.scenario.tables import Extents, Gap, Heading, Length, Point
 Corners = Annotated[tuple[Point, ...], Field(strict=False, json_schema_extra={"unit": "m"})]
 Mass = Annotated[float, Field(gt=0, le=10_000, json_schema_extra={"unit": "kg"})]
 Shade = Annotated[float, Field(ge=0, le=1)]
-ImageFile = Annotated[str, StringConstraints(min_length=1)]
+FileName = Annotated[str, StringConstraints(min_length=1)]
 Corner = tuple[float, float]
 
 MAX_POINTS = 100
@@ -147,7 +147,7 @@ class LightTable(_PositionedTable):
 class MapTable(ScenarioTable):
     """Obstacles from a picture, whose dark pixels are merged into boxes; its centre is the arena's."""
 
-    image: ImageFile
+    image: FileName
     """The picture's file, relative to the scenario: PNG, PGM or the like. Its top is at the greatest y."""
     resolution_m: Length
     """Side of a pixel."""
@@ -157,7 +157,18 @@ class MapTable(ScenarioTable):
     """Height of the obstacles; default: infinite."""
 
 
-MapForms = Annotated[Annotated[ImageFile, Tag("string")] | Annotated[MapTable, Tag("object")], Discriminator(form_of)]
+class BuildingsTable(ScenarioTable):
+    """Obstacles from a file of buildings or of a simulator's world."""
+
+    file: FileName
+    """GeoJSON (.geojson, .json) or SDF (.sdf, .world), relative to the scenario."""
+    origin: Annotated[tuple[float, float], Field(strict=False)] | None = None
+    """Latitude and longitude in degrees of the arena's origin, for GeoJSON; default: its coordinates are in m."""
+    height_m: Length | None = None
+    """Height of buildings for which GeoJSON has neither height nor building:levels; default: infinite."""
+
+
+MapForms = Annotated[Annotated[FileName, Tag("string")] | Annotated[MapTable, Tag("object")], Discriminator(form_of)]
 
 
 class DiscPatchTable(ScenarioTable):
@@ -196,7 +207,7 @@ class GroundTable(ScenarioTable):
 
     shade: Shade = 1.0
     """Brightness of the floor without picture and patches, from 0 (black) to 1 (white)."""
-    image: ImageFile | None = None
+    image: FileName | None = None
     """A picture's file, relative to the scenario, stretched over the arena; its top is at the greatest y."""
     patches: tuple[PatchTable, ...] = Field(default=(), strict=False)
     """Patches; later ones cover earlier ones."""
@@ -206,7 +217,7 @@ class ArenaTable(ScenarioTable):
     """[arena]: a bounded plane with obstacles, lights and a floor; the origin is its centre."""
 
     size_m: Extents | None = None
-    """Full extents along x and y; default: the map's, for one of Nav2 those of its known cells."""
+    """Full extents along x and y; default: the map's, for one of Nav2 those of its known cells, else the buildings'."""
     boundary: Boundary = "walls"
     """Walls that bodies hit and sensors see; nothing; or a torus: opposite sides meet, for bodies without contacts."""
     obstacles: tuple[Annotated[ObstacleTable, Field(discriminator="shape")], ...] = Field(default=(), strict=False)
@@ -215,12 +226,14 @@ class ArenaTable(ScenarioTable):
     """Lights that sensors see."""
     map: MapForms | None = None
     """More obstacles: the YAML file of a Nav2 map, relative to the scenario, or the table of a picture."""
+    buildings: BuildingsTable | None = None
+    """More obstacles, from a file of buildings."""
     ground: GroundTable | None = None
     """The floor; default: white."""
 
     @model_validator(mode="after")
     def _check_size(self) -> "ArenaTable":
-        if self.size_m is None and self.map is None:
-            expected = "is missing; expected a list of 2 numbers above 0 and at most 10000 (m), or a map"
+        if self.size_m is None and self.map is None and self.buildings is None:
+            expected = "is missing; expected a list of 2 numbers above 0 and at most 10000 (m), a map or buildings"
             raise PydanticCustomError(UNFIT, "{expected}", {"key": "size_m", "expected": expected})
         return self

@@ -44,3 +44,12 @@ class Obstacle:
         c, s = portable.cos(self.heading_rad), portable.sin(self.heading_rad)
         x, y = points[:, 0], points[:, 1]
         return np.stack([self.x_m + (c * x - s * y), self.y_m + (s * x + c * y)], axis=1)
+
+    @property
+    def extent_m(self) -> tuple[FloatArray, FloatArray]:
+        """The least and the greatest x, y, (2,) each, in the arena's frame."""
+        if self.shape == "cylinder":
+            centre = np.array([self.x_m, self.y_m])
+            return centre - self.radius_m, centre + self.radius_m
+        corners_m = self.corners_m
+        return corners_m.min(axis=0), corners_m.max(axis=0)

@@ -16,7 +16,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.deploy.cli.actions.argos_controllers import ArgosController
-from swarmwire.world.placement.occupancy import extent, obstacle_at
+from swarmwire.world.placement.occupancy import obstacle_at
 from swarmwire.world.scenario.arena import BoxTable, CylinderTable
 
 BODIES = {  # ARGoS's robot: the body, and how it differs
@@ -254,7 +254,7 @@ def _extents(draft: Draft) -> list[tuple[FloatArray, FloatArray]]:
     for obstacle in (obstacle for obstacle in draft.obstacles if "at" in obstacle):
         table = (BoxTable if obstacle["shape"] == "box" else CylinderTable).model_validate(obstacle)
         x_m, y_m = obstacle["at"]
-        extents.append(extent(obstacle_at(table, x_m, y_m, obstacle.get("heading_rad", 0.0))))
+        extents.append(obstacle_at(table, x_m, y_m, obstacle.get("heading_rad", 0.0)).extent_m)
     return extents
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from swarmwire.deploy.runs.config import RunConfig
 from swarmwire.deploy.runs.plan import make_plan
 from swarmwire.deploy.terminal.output import echo
-from swarmwire.world.placement.maps import map_hint
+from swarmwire.world.placement.maps import layout_hints
 from swarmwire.world.scenario_file import load_scenario, scenario_schema
 
 
@@ -22,7 +22,7 @@ def check_scenario(path: Path, overrides: Sequence[str]) -> None:
     too_late = f"; too late to happen: {', '.join(late)}" if late else ""
     length = f"{scenario.duration_s:g} s at {static.rate_hz} Hz"
     echo(f"OK {path}: {groups}, {length}, engine {engines}{too_late}")
-    if hint := map_hint(scenario.arena, scenario.source):
+    for hint in layout_hints(scenario.arena, scenario.source):
         echo(f"hint: {hint}")
 
 

@@ -32,7 +32,7 @@ from swarmwire.deploy.runs.record.folder import default_folder
 from swarmwire.deploy.runs.result import Result
 from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.deploy.terminal.console import TerminalConsole
-from swarmwire.world.placement.maps import map_hint
+from swarmwire.world.placement.maps import layout_hints
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
 
@@ -79,7 +79,7 @@ def show_run(config: RunConfig, console: Console, views: OpenViews, observers: S
     folder = Path(config.out or "")
     with report_compiling(console):
         simulation = Simulation(config)
-        if hint := map_hint(simulation.plan.scenario.arena, simulation.plan.scenario.source):
+        for hint in layout_hints(simulation.plan.scenario.arena, simulation.plan.scenario.source):
             console.print(f"hint: {hint}", soft_wrap=True)
         with ExitStack() as stack:
             open_views: dict[str, LiveView] = {}

@@ -199,6 +199,9 @@ def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
         table: Any = mapping["arena"].get(role, {})
         if not isinstance(table, str) and "image" in table:
             table["image"] = copies.add(path_near_scenario(scenario.source, table["image"]).resolve(), role)
+    if scenario.arena.buildings is not None:
+        file = path_near_scenario(scenario.source, scenario.arena.buildings.file).resolve()
+        mapping["arena"]["buildings"]["file"] = copies.add(file, "buildings")
     return mapping
 
 
