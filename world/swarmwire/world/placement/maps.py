@@ -4,6 +4,7 @@
 its occupied pixels into rectangles: few obstacles for engines, rays and the radio.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -102,8 +103,8 @@ def read_layout(arena: ArenaTable, where: str) -> Layout:
     elif arena.map is not None:
         size_m, obstacles = _read_map(arena.map, size_m, where)
     if arena.buildings is not None:
-        size_m, buildings = _place_buildings(_buildings(arena.buildings, where).obstacles, size_m, where)
-        obstacles += buildings
+        size_m, inside = _place_buildings(_buildings(arena.buildings, where), size_m, where)
+        obstacles += inside
     assert size_m is not None  # checked by the table
     return Layout(size_m, obstacles, _read_floor(arena.ground, where) if arena.ground else None)
 
@@ -118,8 +119,7 @@ def layout_hints(arena: ArenaTable, where: str) -> list[str]:
             text = "is unknown (205 of 255) and free: occupied_below = 0.9 makes this obstacles"
             hints.append(f"{share:.0%} of arena.map {text}")
     if arena.buildings is not None and (left_out := _buildings(arena.buildings, where).left_out):
-        counts = ", ".join(f"{count} x {kind}" for kind, count in left_out.items())
-        hints.append(f"arena.buildings leaves out {counts}")
+        hints.append(f"arena.buildings leaves out {_counted(left_out)}")
     return hints
 
 
@@ -162,12 +162,17 @@ def _buildings(table: BuildingsTable, where: str) -> Buildings:
     return read_buildings(path, table.origin, table.height_m, (where, "arena.buildings"))
 
 
+def _counted(left_out: Counter[str]) -> str:
+    return ", ".join(f"{count} x {kind}" for kind, count in left_out.items())
+
+
 def _place_buildings(
-    buildings: tuple[Obstacle, ...], table_size_m: tuple[float, float] | None, where: str
+    file: Buildings, table_size_m: tuple[float, float] | None, where: str
 ) -> tuple[tuple[float, float], tuple[Obstacle, ...]]:
     """Return the size of the arena in m, by default one that holds all buildings, and those that reach into it."""
+    buildings = file.obstacles
     if not buildings:
-        raise BadInput(where, "arena.buildings", "expected a file with a building")
+        raise BadInput(where, "arena.buildings", f"expected a file with buildings, got {_counted(file.left_out)}")
     low_m, high_m = (np.array(ends_m) for ends_m in zip(*(building.extent_m for building in buildings), strict=True))
     farthest_m = 2.0 * np.maximum(np.abs(low_m), np.abs(high_m)).max(axis=0)
     size_m = table_size_m or (round(float(farthest_m[0]), 6), round(float(farthest_m[1]), 6))

@@ -84,7 +84,8 @@ def _posed(element: Element, frame: SdfFrame, where: str, left_out: Counter[str]
     pose = element.find("pose")
     if pose is None:
         return frame
-    if pose.get("relative_to") or pose.get("rotation_format", "euler_rpy") != "euler_rpy":
+    is_relative = pose.get("relative_to") or pose.get("frame")  # `frame` before SDF 1.7
+    if is_relative or pose.get("rotation_format", "euler_rpy") != "euler_rpy":
         left_out["pose with relative_to or a quaternion"] += 1
         return None
     x, y, z, *angles = _numbers(pose.text, 6, where, "pose") if (pose.text or "").strip() else [0.0] * 6
