@@ -92,7 +92,7 @@ def _facts(static: Static, duration_s: float, enlarged: float) -> list[tuple[str
     width_m, height_m = static.arena_size_m
     obstacles = _counted(static.obstacles[0])
     facts = [
-        ("arena", f"{width_m:g} x {height_m:g} m, " + static.boundary),
+        ("arena", f"{width_m:.4g} x {height_m:.4g} m, " + static.boundary),
         ("obstacles", obstacles[0] if obstacles else "none"),
         *(("", text) for text in obstacles[1:]),
         ("robots", f"{static.robots}"),
