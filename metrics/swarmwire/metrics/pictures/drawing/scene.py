@@ -84,7 +84,9 @@ def draw_scenery(axes: Any, static: Static, arena: int) -> Any:
     axes.add_patch(floor)
     if static.floor is not None:
         draw_floor(axes, static.floor, static, floor)
-    _add_obstacles(axes, static.fixed(arena), {"facecolor": OBSTACLE, "edgecolor": OBSTACLE_EDGE})
+    # The outlines lie below the areas: none is seen between the parts of a map or a building.
+    for look in ({"edgecolor": OBSTACLE_EDGE, "linewidth": 1.6}, {"edgecolor": OBSTACLE, "linewidth": 0.2}):
+        _add_obstacles(axes, static.fixed(arena), {"facecolor": OBSTACLE, **look}).set_clip_path(floor)
     pushed: Look = {"facecolor": MOVABLE, "edgecolor": MOVABLE_EDGE, "linestyle": MOVABLE_DASHES}
     movable = _add_obstacles(axes, [obstacle for obstacle in static.obstacles[arena] if obstacle.movable], pushed)
     for light in static.lights[arena] if static.lights else ():
@@ -101,7 +103,8 @@ def _add_obstacles(axes: Any, obstacles: Sequence[Obstacle], look: Look) -> Any:
     from matplotlib.collections import PatchCollection
 
     shapes = [_shape(obstacle) for obstacle in obstacles]
-    collection: Any = PatchCollection(shapes, linewidth=0.8, zorder=1, **look)
+    arguments: dict[str, Any] = {"linewidth": 0.8, "zorder": 1, **look}
+    collection: Any = PatchCollection(shapes, **arguments)
     axes.add_collection(collection, autolim=False)
     return collection
 
