@@ -77,12 +77,14 @@ class RunBag:
     def write(self, ticks: range) -> Iterator[int]:
         """Write these ticks and the index of the file; yields each tick when it is written."""
         events = self._folder.events(self._arena) if self._folder.files("events") else None
-        before_ns = -1
-        for first in range(ticks.start, ticks.stop, size := max(1, CHUNK_ROBOT_TICKS // self._static.robots)):
-            last = min(first + size, ticks.stop) - 1
-            rows = pl.col("tick").is_between(first, last)
-            chunk = _Chunk.read(self._folder.table("ticks", self._arena, rows=rows).sort("tick"), self._static)
-            packets, ends = self._packets(before_ns if first > ticks.start else chunk.time_ns[0], chunk.time_ns)
+        size, before_ns = max(1, CHUNK_ROBOT_TICKS // self._static.robots), -1
+        for first in range(ticks.start, ticks.stop, size):
+            rows = pl.col("tick").is_between(first, min(first + size, ticks.stop) - 1)
+            table = self._folder.table("ticks", self._arena, rows=rows).sort("tick")
+            if table.is_empty():  # rows that a slow disk cost a run in real time
+                continue
+            chunk = _Chunk.read(table, self._static)
+            packets, ends = self._packets(chunk.time_ns[0] if before_ns < 0 else before_ns, chunk.time_ns)
             for row, time_ns in enumerate(chunk.time_ns):
                 self._write_packets(packets[ends[row] : ends[row + 1]], chunk, row)
                 self._write_scene(chunk, row, time_ns)
