@@ -18,7 +18,7 @@ from swarmwire.metrics.records.run_folder.layout import SUMMARY_FORMAT
 from swarmwire.metrics.records.run_folder.tables import record_summary
 from swarmwire.world.backends.realtime_backend import RealTimeReport
 from swarmwire.world.backends.runner_reports import RunnerEvent
-from swarmwire.world.gateways.ros2.radio import RelayReport
+from swarmwire.world.gateways.ros2.relay_report import RelayReport
 from swarmwire.world.interfaces.frame_ports import InterfacesReport
 from swarmwire.world.loop import Loop
 from swarmwire.world.motion.live import PosesReport

@@ -6,7 +6,6 @@ become messages. It subscribes to exact names only, none of which it publishes t
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
 
@@ -37,6 +36,7 @@ from swarmwire.comms.protocols.ros2.relay import REQUEST, RelayedMessage, Relaye
 from swarmwire.comms.robot.messages import RELAY_TAG, RESERVED_TAGS
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.wire.radio_bridge import BoundedInbox
+from swarmwire.world.gateways.ros2.relay_report import RelayReport, SentCounts, relay_report
 from swarmwire.world.scenario.scenario import Scenario
 
 RADIO_NODE = "radio"
@@ -45,33 +45,6 @@ MAX_WAITING = 1024  # messages of nodes that wait for the loop
 MAX_RECEIVED_TOPICS = 2000  # the declaration of a token takes longer the more there are: 2,000 take some seconds
 FOLLOWS = 4  # looks for missing parts in the time after which they are requested
 LATCHED = Qos(depth=1, latched=True)
-
-
-@dataclass(frozen=True)
-class RelayedRobot:
-    """The messages of a relayed topic at one robot."""
-
-    messages: int  #: messages of its nodes
-    received: int  #: messages of other robots that arrived complete
-    packets: int  #: packets of it that were handed to the radio: parts, repeated ones included, and requests
-    sent_bytes: int  #: payloads of these packets, with the relay's headers
-
-
-@dataclass(frozen=True)
-class RelayReport:
-    """A relayed topic over a run. Messages that were neither received nor lost for good at its end count as lost."""
-
-    topic: str  #: name in the robots' namespaces
-    reliable: bool
-    messages: int
-    intended: int  #: number of intended receivers, of all messages
-    received: int
-    lost: int  #: intended - received
-    packets: int
-    sent_bytes: int
-    repeated: int  #: parts that were sent again on request
-    requests: int
-    robots: dict[str, RelayedRobot]
 
 
 class RosRadio:
@@ -113,7 +86,7 @@ class RosRadio:
         self._declared: list[object] = []  # zenoh undeclares unreferenced ones
         self._inbox = BoundedInbox[Callable[[], None]](MAX_WAITING)
         self._packets: dict[int, list[RelayPacket]] = {}  # by row: packets of `radio/tx`
-        self._counts, self._sent = Counter[str](), Counter[tuple[str, int, int]]()  # what, row, topic
+        self._counts, self._sent = Counter[str](), SentCounts()
         self._follow_ns, self._follow_after_ns = 0, retry_after_ns // FOLLOWS
 
     def prepare(self, messages: Messages) -> None:
@@ -222,34 +195,9 @@ class RosRadio:
 
     def report(self) -> tuple[RelayReport, ...]:
         """Return the report on each relayed topic so far."""
-        return tuple(self._topic_report(index) for index in range(len(self._table.topics)))
-
-    def _topic_report(self, index: int) -> RelayReport:
-        robots = {
-            self._names[row]: RelayedRobot(
-                relay.counts["messages", index],
-                relay.counts["received", index],
-                self._sent["packets", row, index],
-                self._sent["bytes", row, index],
-            )
-            for row, relay in self._relays.items()
-        }
-        totals = {name: sum(getattr(robot, name) for robot in robots.values()) for name in ("messages", "received")}
-        intended = sum(
-            relay.counts["messages", index] * len(self._receivers[index] - {row}) for row, relay in self._relays.items()
-        )
-        topic = self._table.topics[index]
-        return RelayReport(
-            topic.name,
-            topic.reliable,
-            intended=intended,
-            lost=intended - totals["received"],
-            packets=sum(robot.packets for robot in robots.values()),
-            sent_bytes=sum(robot.sent_bytes for robot in robots.values()),
-            repeated=sum(relay.counts["repeated", index] for relay in self._relays.values()),
-            requests=sum(relay.counts["requests", index] for relay in self._relays.values()),
-            robots=robots,
-            **totals,
+        return tuple(
+            relay_report(topic, index, self._names, self._relays, self._receivers[index], self._sent)
+            for index, topic in enumerate(self._table.topics)
         )
 
     def _received_name(self, sender: int, topic: int) -> str:
