@@ -79,6 +79,7 @@ def made_up_summary(ticks: int, *, arenas: int = 1, rate_hz: int = 10, **given: 
         "realtime": None,
         "interfaces": None,
         "poses": [],
+        "relay": [],
         "stop": [],
         "by_arena": [{**end, "counts": {}}] * arenas,
         "trajectory_sha256": [f"{arena:064x}" for arena in range(arenas)],

@@ -247,6 +247,25 @@ def test_gaps_in_poses_from_outside_are_reported_by_robot_the_longest_first(tmp_
     assert "longest gap in s" in page(report)
 
 
+def test_relayed_topics_are_reported_by_robot_and_in_all(tmp_path):
+    folder = run_folder(tmp_path, static(3), wandering(static(3), 6))
+    summary = json.loads((folder / "summary.json").read_text())
+    robots = {
+        "flock-0": {"messages": 1200, "received": 5, "packets": 3610, "bytes": 4_800_000},
+        "flock-1": {"messages": 0, "received": 1100, "packets": 12, "bytes": 240},
+    }
+    totals = {"messages": 1200, "intended": 1205, "received": 1105, "lost": 100, "packets": 3622, "bytes": 4_800_240}
+    topic = {"topic": "map", "reliable": True, **totals, "repeated": 10, "requests": 12, "robots": robots}
+    pace = {"factor": 1.0, "missed_ticks": 0, "worst_lag_s": 0.0, "subtick_s": None, "tick_jitter": None}
+    told = {**summary, "realtime": {**pace, "delivery": None}, "relay": [topic]}
+    (folder / "summary.json").write_text(json.dumps(told))
+    assert table(run_report(folder), "Topic map over the radio") == {
+        "flock-0": ("1,200", "5", "3,610", "4,800,000"),
+        "flock-1": ("0", "1,100", "12", "240"),
+        "all": ("1,200", "1,105", "3,622", "4,800,240"),
+    }
+
+
 def test_lockstep_run_has_no_section_on_real_time(tmp_path):
     report = run_report(run_folder(tmp_path, static(3), wandering(static(3), 6)))
     assert "Real time" not in [section.title for section in report.sections]
