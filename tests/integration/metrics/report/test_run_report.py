@@ -251,10 +251,10 @@ def test_relayed_topics_are_reported_by_robot_and_in_all(tmp_path):
     folder = run_folder(tmp_path, static(3), wandering(static(3), 6))
     summary = json.loads((folder / "summary.json").read_text())
     robots = {
-        "flock-0": {"messages": 1200, "received": 5, "packets": 3610, "bytes": 4_800_000},
-        "flock-1": {"messages": 0, "received": 1100, "packets": 12, "bytes": 240},
+        "flock-0": {"messages": 1200, "received": 5, "packets": 3610, "sent_bytes": 4_800_000},
+        "flock-1": {"messages": 0, "received": 1100, "packets": 12, "sent_bytes": 240},
     }
-    totals = {"messages": 1200, "intended": 1205, "received": 1105, "lost": 100, "packets": 3622, "bytes": 4_800_240}
+    totals = {"messages": 1200, "intended": 1205, "received": 1105, "lost": 100, "packets": 3622, "sent_bytes": 4_800_240}
     topic = {"topic": "map", "reliable": True, **totals, "repeated": 10, "requests": 12, "robots": robots}
     pace = {"factor": 1.0, "missed_ticks": 0, "worst_lag_s": 0.0, "subtick_s": None, "tick_jitter": None}
     told = {**summary, "realtime": {**pace, "delivery": None}, "relay": [topic]}

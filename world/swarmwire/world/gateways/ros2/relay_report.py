@@ -18,7 +18,7 @@ class RelayedRobot:
     messages: int  #: messages of its nodes
     received: int  #: messages of other robots that arrived complete
     packets: int  #: packets of it that were handed to the radio: parts, repeated ones included, and requests
-    bytes: int  #: payloads of these packets, with the relay's headers
+    sent_bytes: int  #: payloads of these packets, with the relay's headers
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class RelayReport:
     received: int
     lost: int  #: intended - received
     packets: int
-    bytes: int
+    sent_bytes: int
     repeated: int  #: parts that were sent again on request
     requests: int
     robots: dict[str, RelayedRobot]
@@ -75,7 +75,7 @@ def relay_report(
         received=received,
         lost=intended - received,
         packets=sum(robot.packets for robot in robots.values()),
-        bytes=sum(robot.bytes for robot in robots.values()),
+        sent_bytes=sum(robot.sent_bytes for robot in robots.values()),
         repeated=sum(relay.counts["repeated", index] for relay in relays.values()),
         requests=sum(relay.counts["requests", index] for relay in relays.values()),
         robots=robots,
