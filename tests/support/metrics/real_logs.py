@@ -166,8 +166,13 @@ def as_bag(logs: Path, to: Path, *, commands: bool = True, packets: bool = True,
                 make["Vector3"](*part)
                 for part in ((float(row["linear_mps"]), 0.0, 0.0), (0.0, 0.0, float(row["angular_radps"])))
             )
+            twist, kind = make["Twist"](ahead, left), "Twist"
+            if name.endswith("_0"):  # its stamp counts, not the time at which it was recorded
+                twist, kind = make["TwistStamped"](header, twist), "TwistStamped"
             if commands:
-                messages.append((at_ns, f"/{name}/cmd_vel", "geometry_msgs/msg/Twist", make["Twist"](ahead, left)))
+                messages.append(
+                    (at_ns + (kind != "Twist") * 10**9, f"/{name}/cmd_vel", f"geometry_msgs/msg/{kind}", twist)
+                )
         for row in (*sent, *received) if packets else ():
             text: dict[str, Any] = {
                 "t_s": float(row["t_s"]),
