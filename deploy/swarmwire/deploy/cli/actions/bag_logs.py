@@ -6,20 +6,20 @@ own logs: `to`, `size_bytes`, `tag`, `latency_s` and `distance_m` may be there, 
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.base.extras import ROS2
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.protocols.ros2.bags import BagMessage, read_bag
 from swarmwire.comms.protocols.ros2.keys import ODOMETRY, POSE_STAMPED, TRANSFORMS, TWIST, TWIST_STAMPED
-from swarmwire.comms.protocols.ros2.messages import Messages, stamp_ns
+from swarmwire.comms.protocols.ros2.messages import stamp_ns
 from swarmwire.comms.protocols.ros2.poses import poses_of
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.metrics.real.real_log.real_logs import RealLogs, named
@@ -37,9 +37,6 @@ from swarmwire.world.motion.traces.reading import read_trace
 POSES, PACKETS, COMMANDS = "/{name}/odom", "/{name}/packets", "/{name}/cmd_vel"  # default topics
 STRING = "std_msgs/msg/String"
 POSE_KINDS, COMMAND_KINDS = (ODOMETRY, POSE_STAMPED, TRANSFORMS), (TWIST, TWIST_STAMPED)
-DISTRO = "jazzy"  # these types are equal in all distributions
-METADATA = "metadata.yaml"  # of a bag's folder
-SUFFIXES = (".mcap", ".db3")
 NAME = "{name}"
 USUAL_RATE_HZ = 10.0
 NO_STAMP_NS = 2**63
@@ -76,11 +73,6 @@ class _BagRobot:
     commands: list[tuple[float, float, float]] = field(default_factory=list[tuple[float, float, float]])
 
 
-def is_bag(path: Path) -> bool:
-    """Return True for the folder or a file of a bag, by its name."""
-    return (path / METADATA).is_file() if path.is_dir() else path.suffix.lower() in SUFFIXES
-
-
 def read_bag_logs(
     path: Path, topics: BagTopics, bodies: Mapping[str, Body] | None = None, rate_hz: float = USUAL_RATE_HZ
 ) -> RealLogs:
@@ -88,7 +80,6 @@ def read_bag_logs(
 
     BadInput for a bag without poses or packets, for a damaged one, and if rosbags is not installed.
     """
-    ROS2.need(str(path))
     messages = _BagMessages(path, topics)
     robots = messages.robots()
     senders = {packet.tx for robot in robots.values() for packet in robot.packets if packet.tx}
@@ -119,29 +110,25 @@ class _BagMessages:
 
     def __init__(self, path: Path, topics: BagTopics) -> None:
         self.notes: list[str] = []
-        self._path, self._topics, self._messages = path, topics, Messages(DISTRO)
+        self._path, self._topics = path, topics
         self._poses = _pattern(topics.poses or POSES, "--poses")
         self._packets = _pattern(topics.packets or PACKETS, "--packets")
         self._commands = _pattern(COMMANDS, "")
         self._start_ns = NO_STAMP_NS  # first stamp of any pose
-        self._counts: dict[str, int] = {}  # messages by topic
         self._names: dict[str, str] = {}  # robots by topic of packets or commands
         self._candidates: list[str] = []
 
     def robots(self) -> dict[str, _BagRobot]:
         """Read the robots, those with poses first."""
         packets, commands = dict[str, list[PacketText]](), dict[str, list[tuple[float, float, float]]]()
-        for topic, kind, log_ns, message in self._read():
-            if kind in POSE_KINDS:
-                self._start_ns = min([self._start_ns, *(stamp_ns(part.header) for part in poses_of(kind, message))])
-            elif kind == STRING:
-                packets.setdefault(self._names[topic], []).append(self._packet(topic, message.data))
+        for message in read_bag(self._path, self._is_read):
+            if message.kind in POSE_KINDS:
+                stamps_ns = (stamp_ns(part.header) for part in poses_of(message.kind, message.content))
+                self._start_ns = min([self._start_ns, *stamps_ns])
+            elif message.kind == STRING:
+                packets.setdefault(self._names[message.topic], []).append(self._packet(message))
             else:
-                time_ns, twist = (
-                    (stamp_ns(message.header), message.twist) if kind == TWIST_STAMPED else (log_ns, message)
-                )
-                command = time_ns / NS_PER_S, float(twist.linear.x), float(twist.angular.z)
-                commands.setdefault(self._names[topic], []).append(command)
+                commands.setdefault(self._names[message.topic], []).append(_command(message))
         robots = self._posed()
         for name in sorted(packets):
             robots.setdefault(name, _BagRobot()).packets = packets[name]
@@ -166,7 +153,7 @@ class _BagMessages:
         return robots
 
     def _report(self, robots: Mapping[str, _BagRobot]) -> None:
-        packets, candidates = self._topics.packets or PACKETS, named(self._candidates) or "none"
+        packets, candidates = self._topics.packets or PACKETS, named(sorted(set(self._candidates))) or "none"
         has_packets = any(robot.packets for robot in robots.values())
         if self._topics.packets and not has_packets:
             raise BadInput("--packets", packets, f"expected topics of {STRING}; poses and texts are on {candidates}")
@@ -181,45 +168,29 @@ class _BagMessages:
         if without:
             self.notes.append(f"no commands of {named(without)}: no topic {COMMANDS}")
 
-    def _read(self) -> Iterator[tuple[str, str, int, Any]]:
-        """Yield topic, type, time of the recorder in ns, and message; BadInput for a damaged bag."""
-        from rosbags.rosbag2 import Reader
-
-        try:
-            with Reader(self._path) as reader:
-                readable = (link.topic for link in reader.connections if link.msgtype in (*POSE_KINDS, STRING))
-                self._candidates = sorted(set(readable))
-                chosen = [link for link in reader.connections if self._is_read(link.topic, link.msgtype)]
-                for link, log_ns, payload in reader.messages(chosen) if chosen else ():
-                    self._counts[link.topic] = self._counts.get(link.topic, 0) + 1
-                    yield link.topic, link.msgtype, log_ns, self._decoded(link.topic, link.msgtype, bytes(payload))
-        except BadInput:
-            raise
-        except Exception as error:  # noqa: BLE001 - the reader trusts the bytes that it reads: damage may raise anything
-            reason = str(error).partition("\n")[0] or type(error).__name__
-            raise BadInput(str(self._path), "", f"expected an intact bag of ROS 2: {reason}") from None
-
     def _is_read(self, topic: str, kind: str) -> bool:
         """Return True for topics of poses, and those of a robot's packets and commands, whose robot it keeps."""
+        if kind in (*POSE_KINDS, STRING):
+            self._candidates.append(topic)
         pattern = self._packets if kind == STRING else self._commands if kind in COMMAND_KINDS else None
         if pattern is not None and (match := pattern.fullmatch(topic)):
             self._names[topic] = match["name"]
         return kind in POSE_KINDS or topic in self._names
 
-    def _packet(self, topic: str, text: str) -> PacketText:
+    def _packet(self, message: BagMessage) -> PacketText:
         try:
-            return msgspec.json.decode(text, type=PacketText)
+            return msgspec.json.decode(message.content.data, type=PacketText)
         except msgspec.MsgspecError as error:
-            raise self._refused(topic, f'expected a packet such as {{"t_s": 12.5, "seq": 7}}: {error}') from None
+            expected = f'expected a packet such as {{"t_s": 12.5, "seq": 7}}: {error}'
+            raise BadInput(str(self._path), message.place, expected) from None
 
-    def _decoded(self, topic: str, kind: str, payload: bytes) -> Any:
-        try:
-            return self._messages.decode(kind, payload)
-        except BadFrame as error:
-            raise self._refused(topic, f"expected an intact message: {error}") from None
 
-    def _refused(self, topic: str, expected: str) -> BadInput:
-        return BadInput(str(self._path), f"message {self._counts[topic]} of {topic}", expected)
+def _command(message: BagMessage) -> tuple[float, float, float]:
+    """Return time in s, speed and turn rate."""
+    is_stamped = message.kind == TWIST_STAMPED
+    time_ns = stamp_ns(message.content.header) if is_stamped else message.log_ns
+    twist = message.content.twist if is_stamped else message.content
+    return time_ns / NS_PER_S, float(twist.linear.x), float(twist.angular.z)
 
 
 def _pattern(text: str, option: str) -> re.Pattern[str]:

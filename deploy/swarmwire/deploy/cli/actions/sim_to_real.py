@@ -16,9 +16,10 @@ from swarmwire.comms.base.atomic import check_output_path
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import file_of, with_file
 from swarmwire.comms.observe.truth import Static
+from swarmwire.comms.protocols.ros2.bags import is_bag
 from swarmwire.comms.protocols.ros2.keys import ros_name
 from swarmwire.deploy.campaigns.store import CampaignWriter
-from swarmwire.deploy.cli.actions.bag_logs import BagTopics, is_bag, read_bag_logs
+from swarmwire.deploy.cli.actions.bag_logs import BagTopics, read_bag_logs
 from swarmwire.deploy.runs.scenario_parts import agent_specs, selected_metrics
 from swarmwire.deploy.terminal.console import TerminalConsole, print_rows
 from swarmwire.deploy.terminal.output import echo

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.protocols.ros2.bags import METADATA
 from swarmwire.world.motion.traces import bonnmotion, emane, ns2, rosbag, run_folder, table
 from swarmwire.world.motion.traces.emane import Origin
 from swarmwire.world.motion.traces.trace import MotionTrace
@@ -24,7 +25,7 @@ FORMATS: Mapping[str, Any] = {  # modules with `read` and `write`; rosbag has no
 }
 FOLDER_FORMATS: Mapping[str, Any] = {  # by a file in the folder; modules with `read` and `files`
     run_folder.STATIC: run_folder,
-    rosbag.METADATA: rosbag,
+    METADATA: rosbag,
 }
 
 
@@ -71,5 +72,5 @@ def _folder_format(folder: Path) -> Any:
     for name, module in FOLDER_FORMATS.items():
         if (folder / name).is_file():
             return module
-    expected = f"expected the folder of a run, with {run_folder.STATIC}, or of a bag, with {rosbag.METADATA}"
+    expected = f"expected the folder of a run, with {run_folder.STATIC}, or of a bag, with {METADATA}"
     raise BadInput(str(folder), "", expected)

@@ -1,8 +1,7 @@
-"""Bags of ROS 2, folders or their files: each topic of Odometry or PoseStamped is a robot, as is each transform.
+"""Bags of ROS 2 as traces: each topic of Odometry or PoseStamped is a robot, as is each transform.
 
-A folder has `metadata.yaml` and one or several files, `.mcap` or `.db3`, also compressed. A robot's name is its topic,
-`/robot_1/odom`, or a topic of TFMessage, parent and frame, `/tf map robot_1/base_link`. Times are those of the stamps,
-and count from the first one. Topics of other types are ignored.
+A robot's name is its topic, `/robot_1/odom`, or a topic of TFMessage, parent and frame, `/tf map robot_1/base_link`.
+Times are those of the stamps, and count from the first one. Topics of other types are ignored.
 """
 
 import re
@@ -14,18 +13,15 @@ import numpy as np
 
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadFrame, BadInput
-from swarmwire.comms.base.extras import ROS2
+from swarmwire.comms.protocols.ros2.bags import METADATA, SUFFIXES, read_bag
 from swarmwire.comms.protocols.ros2.keys import ODOMETRY, POSE_STAMPED, TRANSFORMS
-from swarmwire.comms.protocols.ros2.messages import Messages
-from swarmwire.comms.protocols.ros2.messages import stamp_ns as time_of
+from swarmwire.comms.protocols.ros2.messages import stamp_ns
 from swarmwire.comms.protocols.ros2.poses import SpacePose, poses_of, space_pose
 from swarmwire.world.motion.traces.lines import MAX_NUMBER, refuse_empty
 from swarmwire.world.motion.traces.trace import MotionTrace
 
 KINDS = (ODOMETRY, POSE_STAMPED, TRANSFORMS)
-METADATA = "metadata.yaml"
-STORAGES = (".mcap", ".db3", ".zstd")
-DISTRO = "jazzy"  # these types are equal in all distributions
+STORAGES = (*SUFFIXES, ".zstd")
 
 
 class StampedPose(NamedTuple):
@@ -42,7 +38,6 @@ def files(folder: Path) -> list[Path]:
 
 def read(path: Path) -> MotionTrace:
     """Read the robots in the order of their names; BadInput if rosbags is not installed."""
-    ROS2.need(str(path))
     samples: dict[str, list[StampedPose]] = {}
     for name, sample in _samples(path):
         samples.setdefault(name, []).append(sample)
@@ -63,36 +58,15 @@ def read(path: Path) -> MotionTrace:
 
 def _samples(path: Path) -> Iterator[tuple[str, StampedPose]]:
     """Yield the robots' names and poses in the order of the file."""
-    messages, counts = Messages(DISTRO), dict[str, int]()
-    for topic, kind, payload in _payloads(path):
-        counts[topic] = counts.get(topic, 0) + 1
+    for message in read_bag(path, lambda _, kind: kind in KINDS):
         try:
-            for part in poses_of(kind, messages.decode(kind, payload)):
+            for part in poses_of(message.kind, message.content):
                 pose = space_pose(part.position, part.orientation)
                 if not max(map(abs, pose[:3])) <= MAX_NUMBER:
                     raise BadFrame("malformed", f"a position beyond {MAX_NUMBER:g} m")
-                yield f"{topic} {part.name}".rstrip(), StampedPose(time_of(part.header), pose)
+                yield f"{message.topic} {part.name}".rstrip(), StampedPose(stamp_ns(part.header), pose)
         except BadFrame as error:
-            key = f"message {counts[topic]} of {topic}"
-            raise BadInput(str(path), key, f"expected a pose of the type {kind}: {error}") from None
-
-
-def _payloads(path: Path) -> Iterator[tuple[str, str, bytes]]:
-    """Yield topic, type and payload of each message that may hold poses; BadInput for a damaged bag."""
-    from rosbags.rosbag2 import Reader
-
-    try:
-        with Reader(path) as reader:
-            if chosen := [connection for connection in reader.connections if connection.msgtype in KINDS]:
-                missing = sum(connection.msgcount for connection in chosen)
-                for connection, _, payload in reader.messages(chosen):
-                    missing -= 1
-                    yield connection.topic, connection.msgtype, bytes(payload)
-                if missing:  # the reader skips a file whose topics are others than those of metadata.yaml
-                    raise ValueError(f"{missing} of the messages that it should have are missing")
-    except Exception as error:  # noqa: BLE001 - the reader trusts the bytes that it reads: damage may raise anything
-        reason = str(error).partition("\n")[0] or type(error).__name__
-        raise BadInput(str(path), "", f"expected an intact bag of ROS 2: {reason}") from None
+            raise BadInput(str(path), message.place, f"expected a pose of the type {message.kind}: {error}") from None
 
 
 def _natural(name: str) -> list[Any]:
