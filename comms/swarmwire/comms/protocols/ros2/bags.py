@@ -21,7 +21,7 @@ class BagMessage(NamedTuple):
     kind: str  # its type
     log_ns: int  # time of the recorder
     content: Any
-    place: str  # for errors: `message 3 of /robot_1/odom`
+    position: str  # for errors: `message 3 of /robot_1/odom`
 
 
 def is_bag(path: Path) -> bool:
@@ -38,12 +38,12 @@ def read_bag(path: Path, is_read: Callable[[str, str], bool]) -> Iterator[BagMes
     messages, counts = Messages(DISTRO), Counter[str]()
     for topic, kind, log_ns, payload in _payloads(path, is_read):
         counts[topic] += 1
-        place = f"message {counts[topic]} of {topic}"
+        position = f"message {counts[topic]} of {topic}"
         try:
             content = messages.decode(kind, payload)
         except BadFrame as error:
-            raise BadInput(str(path), place, f"expected an intact message of the type {kind}: {error}") from None
-        yield BagMessage(topic, kind, log_ns, content, place)
+            raise BadInput(str(path), position, f"expected an intact message of the type {kind}: {error}") from None
+        yield BagMessage(topic, kind, log_ns, content, position)
 
 
 def _payloads(path: Path, is_read: Callable[[str, str], bool]) -> Iterator[tuple[str, str, int, bytes]]:

@@ -182,7 +182,7 @@ class _BagMessages:
             return msgspec.json.decode(message.content.data, type=PacketText)
         except msgspec.MsgspecError as error:
             expected = f'expected a packet such as {{"t_s": 12.5, "seq": 7}}: {error}'
-            raise BadInput(str(self._path), message.place, expected) from None
+            raise BadInput(str(self._path), message.position, expected) from None
 
 
 def _command(message: BagMessage) -> tuple[float, float, float]:

@@ -66,7 +66,9 @@ def _samples(path: Path) -> Iterator[tuple[str, StampedPose]]:
                     raise BadFrame("malformed", f"a position beyond {MAX_NUMBER:g} m")
                 yield f"{message.topic} {part.name}".rstrip(), StampedPose(stamp_ns(part.header), pose)
         except BadFrame as error:
-            raise BadInput(str(path), message.place, f"expected a pose of the type {message.kind}: {error}") from None
+            raise BadInput(
+                str(path), message.position, f"expected a pose of the type {message.kind}: {error}"
+            ) from None
 
 
 def _natural(name: str) -> list[Any]:
