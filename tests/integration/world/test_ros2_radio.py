@@ -271,6 +271,12 @@ def test_relay_needs_a_radio_with_room_for_a_part():
             scenario_with(radio=radio)
 
 
+def test_relay_to_a_robot_without_topics_is_refused():
+    behind_gateway = {row: NAMESPACES[row] for row in (0, 2)}
+    with refused_input("maps.toml", "ros2.relay.topics.1.to"):
+        RosRadio(scenario_with(), NAMES, behind_gateway, WallClock())
+
+
 def test_relay_of_too_many_received_topics_is_refused():
     names = [f"flock-{row}" for row in range(40)]
     namespaces = {row: f"/robot{row}" for row in range(40)}

@@ -55,7 +55,7 @@ class RosRadio:
     ) -> None:
         """`names` are those of all robots; `namespaces` has, by row, those of robots with topics.
 
-        BadInput for too many topics.
+        BadInput for too many topics, or receivers without topics.
         """
         assert scenario.radio
         self._source, self._table, self._clock = scenario.source, scenario.ros2.relay, clock
@@ -67,6 +67,10 @@ class RosRadio:
             {row for name in topic.to for row in groups.get(name) or (self._row_of[name],)} or set(rows)
             for topic in self._table.topics
         ]
+        for index, receivers in enumerate(self._receivers):
+            if others := sorted(receivers - namespaces.keys()):
+                expected = f"expected robots that have topics: {self._names[others[0]]} has none"
+                raise BadInput(scenario.source, f"ros2.relay.topics.{index}.to", expected)
         received = sum(len(rows) - 1 for receivers in self._receivers for row in rows if row in receivers)
         if received > MAX_RECEIVED_TOPICS:
             expected = f"expected at most {MAX_RECEIVED_TOPICS} received topics, one for each receiver and sender"
