@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.world.motion.traces.trace import MotionTrace, TracePoses, trace_from
+from swarmwire.world.motion.traces.trace import MotionTrace, TracePoses, trace_from, trace_of_columns
 from tests.support.world.traces import traces
 
 # A square's three sides with rests: east for a second, north for a second, then west from 5 s to 6 s.
@@ -52,7 +52,7 @@ def test_trace_positions_equal_linear_interpolation() -> None:
 
 
 def test_trace_headings_turn_the_short_way() -> None:
-    trace = MotionTrace(
+    trace = trace_of_columns(
         ("a",),
         np.array([0, 3]),
         np.array([0.0, 1.0, 2.0]),
@@ -67,7 +67,7 @@ def test_trace_headings_turn_the_short_way() -> None:
 
 def test_trace_without_some_headings_heads_along_the_motion_there() -> None:
     at = np.array([0.0, 1.0, 2.0, 3.0])
-    trace = MotionTrace(("a",), np.array([0, 4]), at, at, at, np.zeros(4), np.array([nan, 2.0, 2.0, nan]))
+    trace = trace_of_columns(("a",), np.array([0, 4]), at, at, at, np.zeros(4), np.array([nan, 2.0, 2.0, nan]))
     headings = [poses(trace, time_s)[3] for time_s in (-1.0, 0.5, 1.0, 1.5, 2.5, 3.0)]
     assert headings == pytest.approx([0.0, pi / 4, 2.0, 2.0, pi / 4, pi / 4])
 

@@ -13,7 +13,7 @@ from swarmwire.metrics.records.run_folder.layout import HEIGHT, MOVABLE, POSE, V
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.run_folder.ticks import robot_columns
 from swarmwire.world.motion.traces.reading import write_trace
-from swarmwire.world.motion.traces.trace import MotionTrace
+from swarmwire.world.motion.traces.trace import MotionTrace, trace_of_columns
 
 CORNER_SUFFIXES = (".movements", ".tcl")  # their origin is the lower left corner, that of an arena its centre
 DECIMALS = 6  # poses are recorded with 24 bits: more digits are noise
@@ -55,7 +55,7 @@ def _recorded_motion(folder: RunFolder, options: ExportOptions) -> tuple[MotionT
         altitudes_m = [group.body.altitude_m for group in static.groups for _ in range(group.start, group.stop)]
         z_m = np.repeat(altitudes_m, len(t_s))
     first = len(t_s) * np.arange(static.robots + 1)
-    trace = MotionTrace(static.robot_names, first, np.tile(t_s, static.robots), x_m, y_m, z_m, heading_rad)
+    trace = trace_of_columns(static.robot_names, first, np.tile(t_s, static.robots), x_m, y_m, z_m, heading_rad)
     return trace, static.arena_size_m
 
 

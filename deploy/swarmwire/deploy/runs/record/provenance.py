@@ -3,8 +3,8 @@
 They suffice to repeat a run, also a killed one, without the original scenario.
 
     scenario.toml      with the overrides and the seed of the run; omitted keys stay omitted
-    files/<name>       agents, metrics, measured links, pictures of the arena, byte for byte; users' bodies with the
-                       files of their sensors and actuators
+    files/<name>       agents, metrics, traces, measured links, pictures of the arena, byte for byte; users' bodies with
+                       the files of their sensors and actuators
 
 Other bodies come with swarmwire, and the digests of its parts cover them. An agent file is loaded without its folder on
 `sys.path`, so it can import no neighbour. Installed modules are not copied; their digests are recorded (`modules`).

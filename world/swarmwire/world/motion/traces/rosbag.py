@@ -51,9 +51,9 @@ def read(path: Path) -> MotionTrace:
     start_ns = min(robot[0].stamp_ns for robot in samples.values())
     rows = [sample for name in names for sample in samples[name]]
     t_s = np.array([sample.stamp_ns - start_ns for sample in rows]) / NS_PER_S
-    x_m, y_m, z_m, heading_rad = np.ascontiguousarray(np.array([sample.pose for sample in rows]).T)
+    poses = np.array([sample.pose for sample in rows])
     first = np.cumsum([0, *(len(samples[name]) for name in names)], dtype=np.int64)
-    return MotionTrace(tuple(names), first, t_s, x_m, y_m, z_m, heading_rad)
+    return MotionTrace(tuple(names), first, np.column_stack((t_s, poses)))
 
 
 def _samples(path: Path) -> Iterator[tuple[str, StampedPose]]:

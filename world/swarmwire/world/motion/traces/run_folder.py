@@ -13,7 +13,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import read_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.motion.traces.table import refuse_damage
-from swarmwire.world.motion.traces.trace import MotionTrace
+from swarmwire.world.motion.traces.trace import MotionTrace, trace_of_columns
 
 STATIC = "static.json"
 STATIC_FORMAT = 1
@@ -81,4 +81,4 @@ def read(folder: Path) -> MotionTrace:
     (z_m,) = recorded_z_m or (np.repeat(altitudes_m, len(frame)),)
     t_s = frame["tick"].to_numpy() / static.rate_hz  # as the ends of ticks; `time_s` is rounded to ns
     first = len(frame) * np.arange(robots + 1)
-    return MotionTrace(static.robot_names, first, np.tile(t_s, robots), x_m, y_m, z_m, heading_rad)
+    return trace_of_columns(static.robot_names, first, np.tile(t_s, robots), x_m, y_m, z_m, heading_rad)

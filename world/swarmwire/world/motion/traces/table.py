@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.world.motion.traces.lines import MAX_NUMBER, refuse_empty
-from swarmwire.world.motion.traces.trace import MotionTrace
+from swarmwire.world.motion.traces.trace import PLANE, MotionTrace, T
 
 NEEDED = ("t_s", "robot", "x_m", "y_m")
-OPTIONAL = ("z_m", "heading_rad")
+NUMBERS = ("t_s", "x_m", "y_m")
+OPTIONAL = {"z_m": 0.0, "heading_rad": np.nan}  # with the number where the table lacks the column
 HEADER_LINES = 1
 
 
@@ -25,17 +26,15 @@ def read(path: Path) -> MotionTrace:
     """Read a table; its robots are in the order of their first rows."""
     table = TraceTable(path)
     names, first, order = table.robots()
-    t_s, x_m, y_m = (_in_order(table.numbers(column), order) for column in ("t_s", "x_m", "y_m"))
-    z_m = _in_order(table.numbers("z_m"), order) if table.has("z_m") else np.broadcast_to(0.0, len(t_s))
-    lacking = np.broadcast_to(np.nan, len(t_s))
-    heading_rad = table.numbers("heading_rad", may_lack=True) if table.has("heading_rad") else lacking
+    rows = table.numbers() if order is None else table.numbers()[order]
+    t_s = rows[:, T]
     goes_back = t_s[1:] < t_s[:-1]
     goes_back[first[1:-1] - 1] = False  # from the last sample of a robot to the first one of the next
     if goes_back.any():
         sample = int(np.argmax(goes_back)) + 1
         row = sample if order is None else int(order[sample])
         raise table.refused(row, "t_s", f"expected rising times of each robot, got {t_s[sample]:g} s")
-    return MotionTrace(names, first, t_s, x_m, y_m, z_m, _in_order(heading_rad, order))
+    return MotionTrace(names, first, rows)
 
 
 def write(path: Path, trace: MotionTrace) -> None:
@@ -75,10 +74,6 @@ def refuse_damage(path: Path) -> Generator[None]:
         raise BadInput(str(path), "", f"expected an intact table: {reason}") from None
 
 
-def _in_order(values: AnyArray, order: IntArray | None) -> AnyArray:
-    return values if order is None else values[order]
-
-
 class TraceTable:
     """The columns of a file; BadInput names its row or line, and the column."""
 
@@ -106,31 +101,32 @@ class TraceTable:
                 raise BadInput(str(self._path), column, f"is missing; the table has {', '.join(columns)}")
         return [column for column in (*NEEDED, *OPTIONAL) if column in columns]
 
-    def has(self, column: str) -> bool:
-        """Return True if the file has a column."""
-        return column in self._frame.columns
+    def numbers(self) -> FloatArray:
+        """Return the rows of a trace, (rows, 3) or, with heights or headings, (rows, 5)."""
+        import polars as pl
 
-    def numbers(self, column: str, *, may_lack: bool = False) -> FloatArray:
-        """Return a column (rows,); NaN for empty cells, if these are allowed."""
+        columns = {name: self._numbers(name) for name in (*NUMBERS, *OPTIONAL) if name in self._frame.columns}
+        if len(columns) > PLANE:
+            lacking = {name: pl.repeat(number, len(self._frame), eager=True) for name, number in OPTIONAL.items()}
+            columns = {**lacking, **columns}
+        return pl.DataFrame(columns).select(NUMBERS + tuple(OPTIONAL)[: len(columns) - PLANE]).to_numpy(order="c")
+
+    def _numbers(self, column: str) -> Any:
+        """Return a column; BadInput for its first cell that is no number. A heading may be empty or NaN."""
         import polars as pl
 
         cells = self._frame[column]
         if not (cells.dtype.is_numeric() or cells.dtype in (pl.String, pl.Null)):
             raise BadInput(str(self._path), column, f"expected numbers, got the type {cells.dtype}")
         numbers = cells.cast(pl.Float64, strict=False)
-        values: FloatArray = numbers.to_numpy()
-        least, most = (np.fmin, np.fmax) if may_lack else (np.minimum, np.maximum)
-        is_read = numbers.null_count() == cells.null_count()  # False: a text is no number
-        if is_read and least.reduce(values) >= -MAX_NUMBER and most.reduce(values) <= MAX_NUMBER:
-            return values  # a mask takes several times as long
-        is_valid = (values >= -MAX_NUMBER) & (values <= MAX_NUMBER)
-        if may_lack:
-            is_valid |= np.isnan(values)
-            is_valid &= (numbers.is_not_null() | cells.is_null()).to_numpy()
+        is_valid = numbers.is_between(-MAX_NUMBER, MAX_NUMBER)
+        if column == "heading_rad":
+            is_valid = is_valid | numbers.is_nan() | cells.is_null()
+        is_valid = is_valid.fill_null(False)
         if not is_valid.all():
-            row = int(np.argmin(is_valid))
+            row = int((~is_valid).arg_max())
             raise self.refused(row, column, f"expected a number of at most {MAX_NUMBER:g}, got {cells[row]!r}")
-        return values
+        return numbers
 
     def robots(self) -> tuple[tuple[str, ...], IntArray, IntArray | None]:
         """Return the names of the robots by first appearance, the bounds of each one's rows, and the order of the rows.
