@@ -51,6 +51,18 @@ def test_expectation_is_not_met_where_a_run_failed_or_is_missing(tmp_path, fault
     assert are_met(folder, "order >= 0", "order >= 0 in 10 % of runs") == [False, True, False, True]
 
 
+@pytest.mark.parametrize(("seeds", "is_met"), [(5, False), (6, True)])
+def test_expectation_of_a_campaign_needs_runs_for_an_interval(tmp_path, seeds, is_met):
+    folder = write_campaign(tmp_path / "a", {"radio.loss": [0.0]}, seeds=range(seeds))
+    assert are_met(folder, "order >= 0", "order.final.mean >= 0") == [is_met] * 2
+
+
+def test_expectation_is_not_met_where_a_run_has_no_value(tmp_path):
+    values = iter([float("nan"), *[1.0] * 9])
+    folder = write_campaign(tmp_path / "a", {"radio.loss": [0.0]}, numbers={"order.final": lambda *_: next(values)})
+    assert are_met(folder, "order >= 0", "order.final.mean >= 0", "order >= 0 in 50 % of runs") == [False, False, True]
+
+
 @pytest.mark.parametrize(
     ("text", "key"),
     [

@@ -108,7 +108,7 @@ def test_jump_counts_also_in_height() -> None:
 
 def test_stamps_order_poses_and_time_jumps_in_place_of_their_arrival() -> None:
     clock = FakeClock()
-    source = given(clock, max_speed_mps=2.0, stamps=True)
+    source = given(clock, max_speed_mps=2.0, stamps=True, max_age_s=100.0)
     source.put("a-0", 0.0, 0.0, 0.0, 0.0, 5 * NS_PER_S)
     source.put("a-0", 3.0, 0.0, 0.0, 0.0, 7 * NS_PER_S)  # 1.5 m/s by the stamps; both arrive at once
     source.put("a-0", 1.0, 0.0, 0.0, 0.0, 6 * NS_PER_S)
@@ -117,6 +117,47 @@ def test_stamps_order_poses_and_time_jumps_in_place_of_their_arrival() -> None:
     source.put("a-0", 3.0, 0.0, 0.0, 0.0)
     assert poses(source)[4][0] == 3.0
     assert source.counts() == {"poses_late": 1, "poses_jumped": 1, "poses_malformed": 1}
+
+
+def test_pose_that_was_wrong_is_replaced_once_the_robot_was_silent() -> None:
+    clock = FakeClock()
+    source = given(clock, max_speed_mps=2.0, stamps=True, max_age_s=1.0)
+    source.put("a-0", 9.0, 0.0, 0.0, 0.0, 900 * NS_PER_S)  # of the future, and far away
+    clock.time_ns += NS_PER_S
+    source.put("a-0", 0.0, 0.0, 0.0, 0.0, NS_PER_S)
+    assert poses(source)[4][0] == 9.0
+    clock.time_ns += 1
+    source.put("a-0", 0.5, 0.0, 0.0, 0.0, NS_PER_S + 1)
+    assert poses(source)[4][0] == 0.5
+    assert source.counts() == {"poses_late": 1}
+
+
+def test_pose_that_arrived_by_the_time_is_given_though_a_newer_one_waits() -> None:
+    clock = FakeClock()
+    source = given(clock)
+    arrivals_ns = [clock.time_ns + k * 1_000_000 for k in range(4)]
+    for k, at_ns in enumerate(arrivals_ns):
+        clock.time_ns = at_ns
+        source.put("a-0", 0.01 * k, 0.0, 0.0, 0.0)
+    assert [source.pop_new(at_ns).value[0] for at_ns in arrivals_ns[1:3]] == [0.01, 0.02]
+    assert poses(source)[4][0] == 0.03
+
+
+@pytest.mark.parametrize("datagram", [b'{"robot": "a-0", "x_m": 0, "y_m": 0, "t_s": 1e300}', b'{"robot":', b"\xff"])
+@pytest.mark.parametrize("stamps", [True, False])
+def test_datagram_that_is_odd_does_not_end_the_source(datagram: bytes, stamps: bool) -> None:
+    source = UdpSource(
+        UdpMotion(source="udp", listen="127.0.0.1:0", stamps=stamps), ["a-0"], [0], (10.0, 5.0), FakeClock()
+    )
+    source.open()
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            host, _, port = source.address.removeprefix("udp ").rpartition(":")
+            sender.sendto(datagram, (host, int(port)))
+            sender.sendto(b'{"robot": "a-0", "x_m": 1, "y_m": 2, "t_s": 3}', (host, int(port)))
+            until(lambda: not source.missing())
+    finally:
+        source.close()
 
 
 def test_stamp_of_a_datagram_is_its_t_s() -> None:

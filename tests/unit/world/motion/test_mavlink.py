@@ -127,6 +127,8 @@ def test_mavlink_random_bytes_give_no_pose(source: MavlinkSource) -> None:
         for datagram in datagrams:
             source.take(datagram)
         assert poses(source) == {}
+        source.take(packed(at(1.0, 2.0, -3.0)))
+        assert poses(source) == {4: [2.0, 1.0, 3.0]}
 
     sent()
 

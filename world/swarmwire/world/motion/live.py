@@ -6,10 +6,10 @@ With sub-ticks the radio medium gets them at the start of each sub-tick, the wor
 
 import math
 from abc import ABC, abstractmethod
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from swarmwire.world.scenario.motion import LiveMotion
 
 POLL_NS = to_ns(0.02)  # interval of polls for the first poses
 POSITION_NOISE_M = 0.1  # a difference up to this is no jump
+MAX_WAITING = 64  # poses of a robot that the loop has not had, as in a pause
+MAX_M = 1e9  # a position beyond it is no position
 BURST_S = 0.1  # two poses that were sent up to this time apart may arrive together
 
 
@@ -38,12 +40,17 @@ class PosesReport:
     silent_ticks: dict[str, int]  #: by robot, if any: ticks at which its newest pose was older than `max_age_s`
 
 
+class _ArrivedPose(NamedTuple):
+    at_ns: int  # arrival, wall time
+    pose: tuple[float, float, float, float]
+
+
 class LiveSource(ABC):
     """The poses of one group's robots as they arrive; `put` may be called from any thread.
 
     A pose is ignored, and counted, if it is malformed, of an unknown robot, outside the arena, late (with `stamps`), or
-    a jump: farther from the last one than `max_speed_mps` allows in the time between. After a jump that was none the
-    next poses are used as soon as this time has passed.
+    a jump: farther from the last one than `max_speed_mps` allows in the time between. After `max_age_s` without a
+    usable pose the next one is used wherever it is: the last one, or its stamp, may have been wrong.
 
     Attributes:
         address: where poses arrive; known from `open` on.
@@ -72,7 +79,8 @@ class LiveSource(ABC):
         self._pose: FloatArray = np.full((len(names), 4), np.nan)  # x, y, z in m, heading in rad
         self._arrived_ns = [clock.now_ns()] * len(names)  # without a pose: the age counts from now
         self._timed_ns = [0] * len(names)  # stamps of the last poses, or their arrivals
-        self._has_pose, self._is_new = [False] * len(names), [False] * len(names)
+        self._has_pose = [False] * len(names)
+        self._new = [deque[_ArrivedPose](maxlen=MAX_WAITING) for _ in names]  # poses that the loop has not had
         self._counted = Counter[str]()
         self._use = LatencyHistogram()
         self._received, self._longest_ns, self._silent = 0, [0] * len(names), [0] * len(names)
@@ -96,7 +104,7 @@ class LiveSource(ABC):
         timed_ns, is_finite = stamp_ns if self.motion.stamps else now_ns, math.isfinite(x_m) and math.isfinite(y_m)
         if index is None:
             self._counted["poses_of_unknown"] += 1
-        elif timed_ns is None or not is_finite or math.isinf(z_m) or math.isinf(heading_rad):
+        elif timed_ns is None or not is_finite or math.isinf(heading_rad) or max(abs(x_m), abs(y_m), abs(z_m)) > MAX_M:
             self._counted["poses_malformed"] += 1
         elif abs(x_m) > self._half_m[0] or abs(y_m) > self._half_m[1]:
             self._counted["poses_outside"] += 1
@@ -108,7 +116,8 @@ class LiveSource(ABC):
         x_m, y_m, z_m, heading_rad = pose
         last_x_m, last_y_m, last_z_m, last_heading_rad = self._pose[index].tolist()
         z_m = last_z_m if math.isnan(z_m) else z_m
-        if self._has_pose[index]:
+        is_silent = now_ns - self._arrived_ns[index] > to_ns(self.motion.max_age_s)
+        if self._has_pose[index] and not is_silent:
             climb_m = 0.0 if math.isnan(last_z_m) else z_m - last_z_m
             away_m = math.hypot(x_m - last_x_m, y_m - last_y_m, climb_m)
             if timed_ns < self._timed_ns[index]:
@@ -119,10 +128,9 @@ class LiveSource(ABC):
                 self._counted["poses_jumped"] += 1
                 return
         heading_rad = last_heading_rad if math.isnan(heading_rad) else heading_rad
-        # One assignment, so that the loop's thread never reads a part of two poses.
         self._pose[index] = x_m, y_m, z_m, heading_rad
-        self._arrived_ns[index], self._timed_ns[index] = now_ns, timed_ns
-        self._has_pose[index] = self._is_new[index] = True
+        self._arrived_ns[index], self._timed_ns[index], self._has_pose[index] = now_ns, timed_ns, True
+        self._new[index].append(_ArrivedPose(now_ns, (x_m, y_m, z_m, heading_rad)))
         self._received += 1
 
     def count(self, fault: str) -> None:
@@ -147,14 +155,18 @@ class LiveSource(ABC):
             self._silent[index] += age_ns > max_age_ns
 
     def pop_new(self, by_ns: int) -> SparseTable:
-        """Return poses that are new since the last call and arrived by this wall time, in slots x, y, z, heading."""
-        new = [index for index, is_new in enumerate(self._is_new) if is_new and self._arrived_ns[index] <= by_ns]
-        if not new:
+        """Return the newest pose of each robot that arrived since the last call and by this wall time.
+
+        The slots are x, y, z and heading.
+        """
+        newest: dict[int, _ArrivedPose] = {}
+        for index, arrived in enumerate(self._new):
+            while arrived and arrived[0].at_ns <= by_ns:
+                newest[index] = arrived.popleft()
+        if not newest:
             return NOTHING_SET
-        for index in new:
-            self._is_new[index] = False
-        self._use.add(np.array([by_ns - self._arrived_ns[index] for index in new]))
-        return SparseTable.from_dense(self._rows[new], self._pose[new])
+        self._use.add(np.array([by_ns - pose.at_ns for pose in newest.values()]))
+        return SparseTable.from_dense(self._rows[list(newest)], np.array([pose.pose for pose in newest.values()]))
 
     def status(self) -> dict[str, Any]:
         """Return the source, the age of the oldest robot's newest pose, and the robots that are silent now."""

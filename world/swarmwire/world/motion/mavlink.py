@@ -5,6 +5,7 @@ of versions 1 and 2 arrive as datagrams, many vehicles at one address. Those of 
 are ignored. Source: common.xml of MAVLink, https://mavlink.io/en/messages/common.html.
 """
 
+from functools import partial
 from math import isfinite, nan, pi, radians
 from typing import Any
 
@@ -32,8 +33,7 @@ class MavlinkSource(DatagramSource):
         MAVLINK.need("mavlink")
         from pymavlink.dialects.v20 import common
 
-        self._parser: Any = common.MAVLink(None)
-        self._parser.robust_parsing = True
+        self._new_parser = partial(common.MAVLink, None)
         count = len(self.names)
         systems = self.motion.systems or range(1, min(count, MAX_SYSTEM) + 1)
         if not count == len(systems) == len(set(systems)):
@@ -45,7 +45,12 @@ class MavlinkSource(DatagramSource):
 
     def take(self, datagram: bytes) -> None:
         """Take the messages in a datagram."""
-        for message in self._parser.parse_buffer(datagram) or ():
+        parser: Any = self._new_parser()  # for each datagram: what one lacks is not in the next
+        parser.robust_parsing = True
+        messages = parser.parse_buffer(datagram)
+        if parser.buf_len():
+            self.count("poses_malformed")
+        for message in messages or ():
             kind: str = message.get_type()
             if kind == BAD_DATA:
                 self.count("poses_malformed")
@@ -59,7 +64,7 @@ class MavlinkSource(DatagramSource):
         elif kind == "LOCAL_POSITION_NED" and origin is None:
             heading_rad = _heading_rad(self._yaw_rad.get(system, nan))
             self.put(name, message.y, message.x, -message.z, heading_rad, NS_PER_MS * message.time_boot_ms)
-        elif kind == "GLOBAL_POSITION_INT" and origin is not None:
+        elif kind == "GLOBAL_POSITION_INT" and origin is not None and (message.lat or message.lon):  # 0, 0: no fix yet
             point = Geodetic(message.lat / UNITS_PER_DEG, message.lon / UNITS_PER_DEG, message.alt / MM_PER_M)
             east_m, north_m, up_m = map(float, to_local(point, Geodetic(*origin)))
             yaw_rad = nan if message.hdg == UNKNOWN_HEADING else radians(message.hdg / UNITS_PER_HDG_DEG)

@@ -20,6 +20,7 @@ from swarmwire.world.motion.live import LiveSource
 from swarmwire.world.scenario.motion import UdpMotion
 
 MAX_DATAGRAM_BYTES = 65_535
+MAX_TIME_S = 1e9  # of a stamp: some 30 years
 MAX_PORT = 65_535
 BUFFER_BYTES = 1 << 20  # the kernel's queue of datagrams, which it may cut
 POLL_S = 0.2  # time after which the thread sees that the source was closed
@@ -71,7 +72,10 @@ class DatagramSource(LiveSource):
                 datagram = self._socket.recv(MAX_DATAGRAM_BYTES)
             except TimeoutError:
                 continue
-            self.take(datagram)
+            try:
+                self.take(datagram)
+            except Exception:  # noqa: BLE001 - whatever a datagram does to its decoder, the next one is received
+                self.count("poses_malformed")
 
 
 class UdpSource(DatagramSource):
@@ -91,7 +95,7 @@ class UdpSource(DatagramSource):
         except (msgspec.MsgspecError, UnicodeDecodeError):
             self.count("poses_malformed")
         else:
-            stamp_ns = to_ns(message.t_s) if math.isfinite(message.t_s) else None
+            stamp_ns = to_ns(message.t_s) if abs(message.t_s) <= MAX_TIME_S else None  # NaN: without a stamp
             self.put(message.robot, message.x_m, message.y_m, message.z_m, message.heading_rad, stamp_ns)
 
 

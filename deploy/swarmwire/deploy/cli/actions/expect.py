@@ -7,6 +7,7 @@ from xml.etree import ElementTree as ET
 import typer
 from rich.text import Text
 
+from swarmwire.comms.base.atomic import check_output_path, output_file
 from swarmwire.deploy.cli.options import FAILED
 from swarmwire.deploy.terminal.console import TerminalConsole, print_rows
 from swarmwire.deploy.terminal.output import echo
@@ -17,6 +18,8 @@ COLUMNS = ("result", "expected", "at", "measured")
 
 def check_expectations(folder: str, expectations: Sequence[str], junit: Path | None) -> None:
     """Print a line for each expectation and design point; exit code 1 if one is not met."""
+    if junit is not None:
+        check_output_path(junit, (".xml",))
     checked = verdicts(folder, [parse_expectation(text) for text in expectations])
     rows = [("met" if each.is_met else "NOT MET", each.expectation.text, each.at, each.measured) for each in checked]
     console = TerminalConsole()
@@ -39,4 +42,5 @@ def write_junit(folder: str, checked: Sequence[Verdict], file: Path) -> None:
         case = ET.SubElement(suite, "testcase", classname="swarmwire.expect", name=name)
         if not each.is_met:
             ET.SubElement(case, "failure", message=f"measured {each.measured}")
-    ET.ElementTree(suite).write(file, encoding="utf-8", xml_declaration=True)
+    with output_file(file) as temporary:
+        ET.ElementTree(suite).write(temporary, encoding="utf-8", xml_declaration=True)

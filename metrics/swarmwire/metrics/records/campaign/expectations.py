@@ -1,7 +1,7 @@
 """Expectations of runs and campaigns, such as `order.final >= 0.9`, and whether the results meet them.
 
 An expectation of a campaign is met at a design point if the 95 % interval of the statistic lies wholly on the side that
-it names: with few runs it is not met rather than met by chance. A failed or missing run meets nothing.
+it names. Intervals of fewer than MIN_RUNS runs are too narrow: they meet nothing, as do failed and missing runs.
 """
 
 import math
@@ -37,6 +37,7 @@ GRAMMAR = re.compile(
 )
 EXAMPLES = "such as 'order.final >= 0.9' or 'radio.pdr > 0.5 in 80 % of runs'"
 COUNTS = "counts."
+MIN_RUNS = 6  # with fewer, more than 2 x 2.5 % of samples lie wholly on one side of their median: 2 / 2^5 = 6 %
 USUAL = (STOP_TIME, "radio.pdr", LINK_PDR)  # beside last values of metrics, in suggestions
 
 
@@ -134,18 +135,17 @@ def _verdict(expectation: Expectation, at: str, sample: Sample, stat: Stat) -> V
         low, high = (float(end[0]) for end in binomial_interval(np.array([sum(holds)]), np.array([runs])))
         measured = f"{sum(holds)} of {counted(runs, 'run')}, {low:.0%} to {high:.0%}"
         return Verdict(expectation, at, low >= expectation.share, measured)
-    if not len(sample):
-        return Verdict(expectation, at, False, f"no value in {counted(runs, 'run')}")
+    if sample.undefined:
+        return Verdict(expectation, at, False, f"{sample.undefined} of {counted(runs, 'run')} without a value")
     of_all = summary(sample)
     intervals = {"q50": of_all.q50_interval, "mean": of_all.mean_interval}
     if stat not in intervals:
         expected = f"expected a median or a mean, which have intervals: {stat} has none"
         raise BadInput("expectation", expectation.text, expected)
     value = of_all.q50 if stat == "q50" else of_all.mean
-    if len(sample) == 1:
-        return Verdict(
-            expectation, at, sample.undefined == 0 and expectation.holds(value), f"{number_text(value)}, 1 run"
-        )
+    if runs < MIN_RUNS:
+        measured = f"{number_text(value)}, {counted(runs, 'run')}: at least {MIN_RUNS} are needed"
+        return Verdict(expectation, at, False, measured)
     measured = f"{quantile_text(value, of_all.limit)} ({interval_text(intervals[stat])}), {counted(runs, 'run')}"
     return Verdict(expectation, at, expectation.holds_within(intervals[stat]), measured)
 
@@ -163,11 +163,14 @@ def _run_verdicts(run: RunFolder, expectations: Sequence[Expectation]) -> list[V
             names = [column.removesuffix(FINAL) for column in values if column.endswith(FINAL) or column in USUAL]
             raise BadInput(str(run.path), expectation.name, f"expected {did_you_mean(names, expectation.name)}")
         unfaulted: FloatArray = np.zeros(len(content["by_arena"]))
-        sample = number_sample(values.get(name, unfaulted))
+        numbers = values.get(name, unfaulted)
         if content["ended"] in ("failed", "interrupted"):
             rows.append(Verdict(expectation, "", False, f"the run was {content['ended']}"))
+        elif len(numbers) == 1:
+            number = float(numbers[0])
+            rows.append(Verdict(expectation, "", expectation.holds(number), f"{number_text(number)}, 1 run"))
         else:
-            rows.append(_verdict(expectation, "", sample, "q50"))
+            rows.append(_verdict(expectation, "", number_sample(numbers), "q50"))
     return rows
 
 
