@@ -1,5 +1,6 @@
 """`swarmwire import`: ARGoS experiments as scenarios and agents."""
 
+import ast
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -156,6 +157,13 @@ def test_unusable_argos_experiment_is_refused(tmp_path):
     ):
         with refused_input(path):
             converted(tmp_path, EXPERIMENT.replace(old, new))
+
+
+@pytest.mark.parametrize("tag", ["none_controller", "_1_controller", "___", "agent_controller", "robot"])
+def test_argos_controller_with_an_odd_name_becomes_a_class(tmp_path, tag):
+    _, agents, _ = converted(tmp_path, EXPERIMENT.replace("my_rule_controller", tag))
+    classes = [node for node in ast.parse(agents).body if isinstance(node, ast.ClassDef)]
+    assert len({node.name for node in classes} - {"Agent", "Robot"}) == len(classes)
 
 
 @pytest.mark.parametrize("experiment", EXAMPLES, ids=lambda path: path.stem)

@@ -43,6 +43,11 @@ def open_ros_radio(
     followed = [source for source in followed if namespaces.keys().isdisjoint(source.rows)]
     for source in followed:
         namespaces |= dict(zip(source.rows, source.namespaces, strict=True))
+    rows_of: dict[str, int] = {}
+    for row, namespace in namespaces.items():
+        if (other := rows_of.setdefault(namespace, row)) != row:
+            names = f"{static.robot_names[other]} and {static.robot_names[row]}"
+            raise BadInput(scenario.source, "ros2.relay", f"expected namespaces that differ: {names} have {namespace}")
     radio = RosRadio(scenario, static.robot_names, namespaces, clock)
     for rows, gateway in gateways:
         gateway.join(radio, rows[0])

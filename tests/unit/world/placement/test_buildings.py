@@ -165,6 +165,14 @@ def test_unusable_file_of_buildings_is_refused(tmp_path):
     bow_tie = feature([[0, 0], [1, 1], [1, 0], [0, 1], [0, 0]])
     assert_refused(path, "polygon 0", json.dumps(bow_tie))
     assert_refused(scenario, "arena.buildings", json.dumps({"type": "FeatureCollection", "features": []}))
+    odd = {"type": "Feature", "properties": {}, "geometry": {"type": "Circle", "coordinates": [0, 0]}}
+    assert_refused(path, "", json.dumps(odd))
+    house = feature([[8.5, 47.4], [8.5001, 47.4], [8.5001, 47.4001], [8.5, 47.4001], [8.5, 47.4]])
+    assert_refused(path, "polygon 0", json.dumps(house))  # in degrees, without an origin
+    for size in ("3 -1 1", "3 0 1", "3 nan 1", "3 inf 1"):
+        assert_refused(tmp_path / "town.sdf", "size", SDF.replace("3 0.2 1", size), "town.sdf")
+    nested = "<model name='m'><static>true</static>" * 200 + "</model>" * 200
+    assert_refused(tmp_path / "town.sdf", "model", f"<sdf><world>{nested}</world></sdf>", "town.sdf")
     assert_refused(tmp_path / "town.sdf", "", "<sdf>", "town.sdf")
     assert_refused(tmp_path / "town.sdf", "urdf", "<urdf/>", "town.sdf")
     assert_refused(tmp_path / "town.sdf", "size", SDF.replace("3 0.2 1", "3 wide 1"), "town.sdf")

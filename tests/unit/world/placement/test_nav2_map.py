@@ -149,7 +149,7 @@ def test_unusable_nav2_map_is_refused(tmp_path, monkeypatch):
 
     with refused_input(scenario, "arena.map"):
         world_of(tmp_path, {"map": "none.yaml"})
-    for text in ("image: [", "- a", "\x00"):
+    for text in ("image: [", "- a", "\x00", "[" * 2000):
         path.write_text(text)
         with refused_input(scenario, "arena.map"):
             world_of(tmp_path, {"map": "map.yaml"})
@@ -161,6 +161,7 @@ def test_unusable_nav2_map_is_refused(tmp_path, monkeypatch):
     assert_refused(path, "resolution", resolution="wide")
     assert_refused(path, "origin", origin=[0, 0])
     assert_refused(path, "origin", origin=[0, math.nan, 0])
+    assert_refused(path, "origin", origin=[1e300, 0, 0])
     assert_refused(path, "mode", mode="binary")
     assert_refused(scenario, "arena.map", free_thresh=-1.0)
     assert_refused(scenario, "arena.map", origin=[90_000, 0, 0])

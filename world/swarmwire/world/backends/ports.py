@@ -21,7 +21,13 @@ SPREAD_KEY, SPREAD = np.array([derive_key("frames")], np.uint64), purpose("send 
 
 
 class PacketPorts(Protocol):
-    """The programs of robots at the medium."""
+    """The programs of robots at the medium.
+
+    Attributes:
+        tag: of their packets. Packets of agents with it are dropped and counted: they would pass for those of programs.
+    """
+
+    tag: int
 
     def deliver(self, received: ReceivedPackets) -> ReceivedPackets:
         """Pass received packets on to programs; return those for the agents."""
@@ -47,7 +53,7 @@ class PortsBackend:
         """`subtick_ns` is the interval at which packets are read, in simulated time; 0 without sub-ticks."""
         self._backend, self._ports, self._subtick_ns = backend, ports, subtick_ns
         self._waiting: list[SubtickPackets] = []  # sorted by time; some wait for the next tick
-        self._reads = 0
+        self._reads = self._spoofed = 0
         self.start, self.close = backend.start, backend.close
 
     def act(
@@ -57,7 +63,7 @@ class PortsBackend:
         actions = self._backend.act(tick, readings, self._ports.deliver(received), tx_status)
         packets = SentPackets.joined(self._ports.pop_packets())
         self._ports.count_sent(packets)
-        return replace(actions, sent=SentPackets.joined([actions.sent, packets]))
+        return replace(actions, sent=SentPackets.joined([self.of_agents(actions.sent), packets]))
 
     def act_in_time(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses, medium: SubtickMedium
@@ -68,7 +74,16 @@ class PortsBackend:
 
     def counts(self) -> dict[str, int]:
         """Return the numbers of faults of the backend and of the ports, by name."""
-        return {**self._backend.counts(), **self._ports.counts()}
+        spoofed = {"packets_with_reserved_tag": self._spoofed} if self._spoofed else {}
+        return {**self._backend.counts(), **self._ports.counts(), **spoofed}
+
+    def of_agents(self, sent: SentPackets) -> SentPackets:
+        """Return the packets without those that pass for packets of programs, which it counts."""
+        is_spoofed = sent.payloads.tags() == self._ports.tag
+        if not is_spoofed.any():
+            return sent
+        self._spoofed += int(is_spoofed.sum())
+        return sent.select(np.flatnonzero(~is_spoofed))
 
     def send_waiting(self, medium: SubtickMedium, until_ns: int) -> None:
         """Put the packets on the medium that are due."""
@@ -109,7 +124,7 @@ class _MediumWithPorts:
     def send(self, packets: SubtickPackets) -> None:
         """Send packets, after those of programs that are due before them."""
         self._ports.send_waiting(self._medium, packets.at_ns)
-        self._medium.send(packets)
+        self._medium.send(packets._replace(sent=self._ports.of_agents(packets.sent)))
 
     def advance(self, until_ns: int) -> tuple[ReceivedPackets, TxStatuses]:
         """Advance the medium, and exchange packets; those that programs sent until now go out after `until_ns`."""

@@ -39,6 +39,8 @@ class InterfacesReport:
 class FramePorts:
     """The devices of the robots of a run's only arena, in the order of their indices."""
 
+    tag = FRAME_TAG
+
     def __init__(self, interfaces: Sequence[RobotInterface], pace: Pace) -> None:
         self._interfaces, self._pace = interfaces, pace
         self._epoll = select.epoll()

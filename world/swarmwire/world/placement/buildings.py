@@ -25,6 +25,8 @@ LEVEL_M = 3.0  # height of a storey where OpenStreetMap has building:levels alon
 SDF_SUFFIXES = (".sdf", ".world")
 
 Footprint = tuple[Any, float]  # a polygon or several, and the height in m
+LEAST_SIDE_M = 0.1  # 0.1 degrees are 10 km
+
 Corner = tuple[float, float]
 Corners = list[Corner]  # of a polygon, counter-clockwise
 
@@ -60,6 +62,12 @@ def read_buildings(
         if not polygon.is_valid or polygon.is_empty:
             expected = f"expected a polygon that does not cross itself: {_fault(polygon)}"
             raise BadInput(str(path), f"polygon {number}", expected)
+        left, bottom, right, top = polygon.bounds
+        if origin is None and max(right - left, top - bottom) < LEAST_SIDE_M:
+            expected = (
+                "expected arena.buildings.origin with coordinates in degrees: in m it is too small for a building"
+            )
+            raise BadInput(str(path), f"polygon {number}", expected)
         obstacles += [_obstacle(part, top_m) for part in convex_parts(polygon)]
     return Buildings(tuple(obstacles), left_out)
 
@@ -75,6 +83,7 @@ def _footprints(
 ) -> Iterator[Footprint]:
     """Return the polygons of a GeoJSON text: those with a property `building`, or all if none has one."""
     from shapely import transform
+    from shapely.errors import ShapelyError
     from shapely.geometry import shape
 
     try:
@@ -92,7 +101,7 @@ def _footprints(
                 if origin is not None:
                     geometry = transform(geometry, lambda points: _local(points, origin))
                 yield geometry, _height_m(tags, height_m)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError, ShapelyError) as error:
         raise BadInput(where, "", f"expected GeoJSON with polygons: {error}") from None
 
 

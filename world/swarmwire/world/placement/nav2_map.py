@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 MODES = ("trinary", "scale", "raw")
+MAX_ORIGIN = 1e6
 TOUCH = 1e-4  # cells that reach less into the arena, as a share of their side, are left out
 
 ByteArray = NDArray[np.uint8]
@@ -107,7 +108,7 @@ def read_nav2_file(path: Path, where: str, key: str) -> Nav2File:
         content: object = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BadInput(where, key, f"expected a readable file: {path}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         raise BadInput(where, key, f"expected YAML: {path}: {' '.join(str(error).split())}") from None
     if not isinstance(content, dict):
         raise BadInput(where, key, f"expected a YAML file with image, resolution, origin, …: {path}")
@@ -116,8 +117,8 @@ def read_nav2_file(path: Path, where: str, key: str) -> Nav2File:
     )  # yaml-cpp also reads 1e-2 and "0.05" as numbers
     if not (isfinite(file.resolution) and file.resolution > 0.0):
         raise BadInput(str(path), "resolution", f"expected the side of a cell above 0 m, got {file.resolution!r}")
-    if not all(isfinite(number) for number in file.origin):
-        raise BadInput(str(path), "origin", f"expected x, y and yaw, got {file.origin!r}")
+    if not all(abs(number) <= MAX_ORIGIN for number in file.origin):
+        raise BadInput(str(path), "origin", f"expected x and y in m and yaw in rad, got {file.origin!r}")
     if file.mode.lower() not in MODES:
         raise BadInput(str(path), "mode", f"expected one of {', '.join(MODES)}, got {file.mode!r}")
     return file

@@ -18,6 +18,9 @@ UPRIGHT = 1e-6  # sine of the greatest tilt
 FLOOR_M = 1e-3  # lower sides above this leave a gap to the floor
 
 
+MAX_NUMBER = 1e9
+MAX_DEPTH = 100
+
 Vector = tuple[float, float, float]
 
 
@@ -63,7 +66,9 @@ def read_models(text: str, where: str) -> tuple[tuple[Obstacle, ...], Counter[st
     return tuple(obstacles), +left_out
 
 
-def _add_model(model: Element, frame: SdfFrame, where: str, obstacles: list[Obstacle], left_out: Counter[str]) -> None:
+def _add_model(
+    model: Element, frame: SdfFrame, where: str, obstacles: list[Obstacle], left_out: Counter[str], depth: int = 1
+) -> None:
     """Add the obstacles of a static model and of the models in it."""
     inner = _posed(model, frame, where, left_out)
     left_out["include"] += len(model.findall("include"))
@@ -76,7 +81,9 @@ def _add_model(model: Element, frame: SdfFrame, where: str, obstacles: list[Obst
             if (placed := _posed(collision, link_frame, where, left_out)) is not None:
                 _add_collision(collision, placed, where, obstacles, left_out)
     for nested in model.iterfind("model"):
-        _add_model(nested, inner, where, obstacles, left_out)
+        if depth == MAX_DEPTH:
+            raise BadInput(where, "model", f"expected at most {MAX_DEPTH} models within one another")
+        _add_model(nested, inner, where, obstacles, left_out, depth + 1)
 
 
 def _posed(element: Element, frame: SdfFrame, where: str, left_out: Counter[str]) -> SdfFrame | None:
@@ -110,9 +117,9 @@ def _add_collision(
         left_out[kind] += kind != "plane"  # the floor
         return
     if shape.tag == "box":
-        *size_m, length_m = _numbers(shape.findtext("size"), 3, where, "size")
+        *size_m, length_m = _lengths_m(shape.findtext("size"), 3, where, "size")
     else:
-        size_m, length_m = [], _numbers(shape.findtext("length"), 1, where, "length")[0]
+        size_m, length_m = [], _lengths_m(shape.findtext("length"), 1, where, "length")[0]
     x_m, y_m, z_m = frame.position_m
     if abs(frame.rotation[2][2]) < 1.0 - UPRIGHT**2:
         left_out[f"tilted {shape.tag}"] += 1
@@ -126,7 +133,7 @@ def _add_collision(
             Obstacle("box", x_m, y_m, heading_rad, size_m=(size_m[0], size_m[1]), height_m=z_m + 0.5 * length_m)
         )
     else:
-        radius_m = _numbers(shape.findtext("radius"), 1, where, "radius")[0]
+        radius_m = _lengths_m(shape.findtext("radius"), 1, where, "radius")[0]
         obstacles.append(Obstacle("cylinder", x_m, y_m, radius_m=radius_m, height_m=z_m + 0.5 * length_m))
 
 
@@ -135,6 +142,13 @@ def _numbers(text: str | None, count: int, where: str, key: str) -> list[float]:
         numbers = [float(word) for word in (text or "").split()]
     except ValueError:
         numbers = []
-    if len(numbers) != count:
-        raise BadInput(where, key, f"expected {count} numbers, got {text!r}")
+    if len(numbers) != count or not all(abs(number) <= MAX_NUMBER for number in numbers):
+        raise BadInput(where, key, f"expected {count} numbers up to {MAX_NUMBER:g}, got {text!r}")
     return numbers
+
+
+def _lengths_m(text: str | None, count: int, where: str, key: str) -> list[float]:
+    lengths_m = _numbers(text, count, where, key)
+    if min(lengths_m) <= 0.0:
+        raise BadInput(where, key, f"expected lengths above 0 m, got {text!r}")
+    return lengths_m

@@ -182,7 +182,7 @@ class RobotRelay:
             self._repeat(sender, topic - REQUEST, number, part, payload[REQUEST_HEAD.size :])
             return []
         parts: int = PART.unpack_from(payload)[-1]
-        if part >= parts:
+        if part >= parts or (parts - 1) * self._part_bytes > MAX_MESSAGE_BYTES:
             raise BadFrame("malformed", f"part {part} of {parts}")
         stream = self._streams.get((sender, topic))
         if stream is None:

@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 
 from swarmwire.agent import Agent
 
+IMPORTED = ("Agent", "Robot", "Message", "Data")  # other names of the agents' file
 SENSORS = {  # ARGoS's name: the sensors that an agent needs
     "proximity": ("proximity",),
     "footbot_proximity": ("proximity",),
@@ -86,7 +87,9 @@ def read_controllers(root: Element, note: Note) -> dict[str, ArgosController]:
     for element in root.iterfind("controllers/*"):
         words = re.findall(r"[A-Za-z0-9]+", element.tag.removesuffix("_controller"))
         name = "".join(word[:1].upper() + word[1:] for word in words)
-        while name in {other.class_name for other in controllers.values()}:
+        if not name.isidentifier() or iskeyword(name):
+            name = f"Controller{name}"
+        while name in IMPORTED or name in {other.class_name for other in controllers.values()}:
             name += "Again"
         controller = ArgosController(element, name)
         for sensor in element.iterfind("sensors/*"):

@@ -61,7 +61,7 @@ def convert_argos(experiment: Path, agents_file: str) -> tuple[Table, str, list[
         root = ET.parse(experiment).getroot()
     except OSError as error:
         raise BadInput(where, "", f"expected a readable file: {error.strerror}") from None
-    except ET.ParseError as error:
+    except (ET.ParseError, LookupError) as error:  # LookupError: an encoding that Python lacks
         raise BadInput(where, "", f"expected XML: {error}") from None
     if root.tag != "argos-configuration":
         raise BadInput(where, root.tag, "expected an experiment of ARGoS, <argos-configuration>")

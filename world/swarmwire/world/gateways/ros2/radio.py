@@ -32,7 +32,14 @@ from swarmwire.comms.protocols.ros2.keys import (
 )
 from swarmwire.comms.protocols.ros2.links import Publisher, Subscription, UndeclaredPublisher
 from swarmwire.comms.protocols.ros2.messages import Messages
-from swarmwire.comms.protocols.ros2.relay import REQUEST, RelayedMessage, RelayedTopic, RelayPacket, RobotRelay
+from swarmwire.comms.protocols.ros2.relay import (
+    MAX_MESSAGE_BYTES,
+    REQUEST,
+    RelayedMessage,
+    RelayedTopic,
+    RelayPacket,
+    RobotRelay,
+)
 from swarmwire.comms.robot.messages import RELAY_TAG, RESERVED_TAGS
 from swarmwire.comms.robot.packets import Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.wire.radio_bridge import BoundedInbox
@@ -41,7 +48,7 @@ from swarmwire.world.scenario.scenario import Scenario
 
 RADIO_NODE = "radio"
 TX, RX = f"{RADIO_TOPICS}tx", f"{RADIO_TOPICS}rx"
-MAX_WAITING = 1024  # messages of nodes that wait for the loop
+MAX_WAITING = 256  # messages of nodes that wait for the loop
 MAX_RECEIVED_TOPICS = 2000  # the declaration of a token takes longer the more there are: 2,000 take some seconds
 FOLLOWS = 4  # looks for missing parts in the time after which they are requested
 LATCHED = Qos(depth=1, latched=True)
@@ -49,6 +56,8 @@ LATCHED = Qos(depth=1, latched=True)
 
 class RosRadio:
     """The topics on the radio of all robots that have topics."""
+
+    tag = RELAY_TAG
 
     def __init__(
         self, scenario: Scenario, names: Sequence[str], namespaces: Mapping[int, str], clock: DatedClock
@@ -214,9 +223,15 @@ class RosRadio:
             session,
             key,
             attached=attached,
-            on_payload=lambda payload: self._inbox.put(partial(take, payload)),
+            on_payload=partial(self._accept, take),
             on_fault=self._count,
         )
+
+    def _accept(self, take: Callable[[bytes], None], payload: bytes) -> None:
+        if len(payload) > MAX_MESSAGE_BYTES:
+            self._count("too_large")
+        else:
+            self._inbox.put(partial(take, payload))
 
     def _count(self, fault: str) -> None:
         self._counts[f"ros2_radio_{fault}"] += 1
