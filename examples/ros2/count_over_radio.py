@@ -13,7 +13,8 @@ from rclpy.node import Node
 from std_msgs.msg import UInt8MultiArray
 
 PERIOD_S = 1.0
-COUNT = struct.Struct("<I")
+COUNT = struct.Struct("<BI")  # a kind of message, and the count
+KIND = 1
 
 
 class CountOverRadio(Node):
@@ -27,14 +28,14 @@ class CountOverRadio(Node):
     def on_packet(self, packet: UInt8MultiArray) -> None:
         """Take the sender's count; the labels of the dimensions are the sender and what the radio measured."""
         sender, *measured = (dimension.label for dimension in packet.layout.dim)
-        (count,) = COUNT.unpack(bytes(packet.data))
+        _, count = COUNT.unpack(bytes(packet.data))
         self.count = max(self.count, count)
         self.get_logger().info(f"{count} from {sender} {' '.join(measured)}")
 
     def on_timer(self) -> None:
         """Count, and tell all robots within reach."""
         self.count += 1
-        self.radio.publish(UInt8MultiArray(data=COUNT.pack(self.count)))
+        self.radio.publish(UInt8MultiArray(data=COUNT.pack(KIND, self.count)))
 
 
 def main() -> None:
