@@ -26,6 +26,8 @@ def throughputs(run: Path) -> list[tuple[float, float, float]]:
     rows: list[tuple[float, float, float]] = []
     for server in range(1, x_m.shape[1], 2):
         stream = packets.filter((packets["sender"] == server - 1) & (packets["size_bytes"] > DATAGRAM_BYTES))
+        if stream.is_empty():  # never connected
+            continue
         start_s = float(stream["sent_at_ns"].to_numpy().min()) / 1e9
         log, _, _ = (run / "programs" / f"row-{server}.log").read_text().partition("- - -")  # its sum follows
         for from_s, to_s, rate_kbps in (map(float, line) for line in SECOND.findall(log)):

@@ -7,7 +7,6 @@ computes hashes and messages by itself.
 from collections import defaultdict
 from collections.abc import Generator
 from contextlib import closing
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from swarmwire.world.gateways.ros2 import Ros2GatewayOptions
 from swarmwire.world.gateways.ros2.publishers import broadcasters_of
 from swarmwire.world.scenario_file import scenario_from
 from tests.support.clocks import until
+from tests.support.comms.protocols.ros2.definitions import write_definitions
 
 sdk = pytest.importorskip("zenoh_ros2_sdk", reason="needs the development group")
 MAP = "nav_msgs/msg/OccupancyGrid"
@@ -35,22 +35,7 @@ def registry(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Its registry, with the definitions of all types."""
     from zenoh_ros2_sdk.message_registry import get_registry
 
-    folder, store = tmp_path_factory.mktemp("messages"), Messages("jazzy")._store
-    for kind in ANNOUNCED:
-        text, _ = store.generate_msgdef(kind, ros_version=2)
-        own, *others = text.split("=" * 80 + "\n")
-        _write(folder, kind, own)
-        for other in others:
-            name, _, definition = other.partition("\n")
-            package, _, short = name.removeprefix("MSG: ").partition("/")
-            _write(folder, f"{package}/msg/{short.removeprefix('msg/')}", definition)
-    return get_registry(str(folder))
-
-
-def _write(folder: Path, kind: str, definition: str) -> None:
-    path = folder / f"{kind}.msg"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(definition, encoding="utf-8")
+    return get_registry(str(write_definitions(tmp_path_factory.mktemp("messages"), ANNOUNCED)))
 
 
 @pytest.mark.parametrize("kind", sorted(ANNOUNCED))

@@ -12,7 +12,9 @@ import pytest
 from scipy import stats
 from scipy.sparse.csgraph import connected_components
 
+from swarmwire.comms.protocols.ros2.keys import POSE_STAMPED
 from tests.support.clocks import until
+from tests.support.comms.protocols.ros2.definitions import write_definitions
 from tests.support.deploy.interfaces import (
     DISK,
     InterfacesRun,
@@ -135,24 +137,42 @@ def test_tcp_is_slower_where_the_radio_loses(tmp_path):
     assert 1e4 < lossy_bps < 0.5 * clean_bps
 
 
+ROS2_SIMULATOR = """
+import runpy, sys
+from zenoh_ros2_sdk.message_registry import get_registry
+
+get_registry(sys.argv.pop(1))  # definitions of messages, which it would clone from the network
+runpy.run_path(sys.argv.pop(1), run_name="__main__")
+"""
+
+
 @needs_program("iperf3")
-def test_iperf3_throughput_follows_the_distance_of_robots_that_another_simulator_moves(tmp_path, monkeypatch):
+@pytest.mark.parametrize("source", ["udp", "ros2"])
+def test_iperf3_throughput_follows_the_distance_of_robots_that_another_simulator_moves(tmp_path, monkeypatch, source):
     """Rayleigh fading above a threshold that path loss reaches at R: exp(-(d / R)^n) (Rappaport 1996, section 5.6)."""
     monkeypatch.setenv("IPERF3_S", "8")
     for example in ("iperf3.sh", "throughput.py", "throughput.toml"):
         (tmp_path / example).write_bytes((ROOT / "examples" / "motion" / example).read_bytes())
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if source == "udp" else socket.SOCK_STREAM) as probe:
         probe.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{probe.getsockname()[1]}"
+        port = str(probe.getsockname()[1])
     scenario = (
         (tmp_path / "throughput.toml").read_text().replace("../interfaces/standing.py:Standing", "still.py:Still")
     )
-    options = ("--set", f'robots.row.motion.listen="{address}"', "--set", "duration_s=13", "--packets", "all")
-    command = [sys.executable, str(ROOT / "examples" / "motion" / "simulator.py"), address, "60", "9"]
+    motion, examples = f"source='udp', listen='127.0.0.1:{port}'", ROOT / "examples" / "motion"
+    command = [sys.executable, str(examples / "simulator.py"), f"127.0.0.1:{port}", "60", "9"]
+    if source == "ros2":
+        pytest.importorskip("zenoh_ros2_sdk", reason="needs the development group")
+        motion = f"source='ros2', type='{POSE_STAMPED}', listen=['tcp/127.0.0.1:{port}']"
+        definitions = write_definitions(tmp_path / "messages", [POSE_STAMPED])
+        command = [sys.executable, "-c", ROS2_SIMULATOR, str(definitions), str(examples / "ros2_simulator.py")]
+        command += [port, "60", "9"]
+        monkeypatch.setenv("PYTHONPATH", str(examples))
+    options = ("--set", f"robots.row.motion={{{motion}}}", "--set", "duration_s=13", "--packets", "all")
     log = tmp_path / "out" / "log.txt"
 
     def simulator() -> subprocess.Popen[bytes]:
-        until(lambda: log.exists() and address in log.read_text())  # the run is open for poses
+        until(lambda: log.exists() and f"127.0.0.1:{port}" in log.read_text())  # the run is open for poses
         return subprocess.Popen(command)
 
     with ThreadPoolExecutor(1) as pool:
