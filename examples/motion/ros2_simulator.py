@@ -16,7 +16,7 @@ from zenoh_ros2_sdk import ROS2Publisher, ZenohSession
 POSE_STAMPED = "geometry_msgs/msg/PoseStamped"
 
 
-def main(port: str = "7447", seconds: str = "60", period_s: str = "40") -> None:
+def main(port: str = "7447", seconds: str = "300", period_s: str = "40") -> None:
     """Publish the poses until the time is over."""
     publishers = [ROS2Publisher(f"/row_{robot}/pose", POSE_STAMPED, router_port=int(port)) for robot in range(ROBOTS)]
     kinds: dict[str, Any] = ZenohSession.get_instance().store.types

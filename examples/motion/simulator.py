@@ -29,7 +29,7 @@ def paced(seconds: float) -> Iterator[float]:
         yield k / RATE_HZ
 
 
-def main(address: str = "127.0.0.1:9870", seconds: str = "60", period_s: str = "40") -> None:
+def main(address: str = "127.0.0.1:9870", seconds: str = "300", period_s: str = "40") -> None:
     """Send the poses until the time is over."""
     host, _, port = address.rpartition(":")
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
