@@ -328,7 +328,7 @@ def test_relayed_run_is_repeated_bit_for_bit_with_equal_fates(subtick, tmp_path)
         assert simulation.served
         node = open_client(simulation.served.robots[0].address, 20.0)
         with closing(node):
-            air = Air(None, node, True)  # pyright: ignore[reportArgumentType]
+            air = Air(None, node, True)  # pyright: ignore[reportArgumentType] - the test steps the run itself
             samples = air.subscribe("flock_1/radio/flock_0/map", independent.PoseStamped)
             while simulation.tick < simulation.plan.ticks:
                 if simulation.tick % 5 == 0:

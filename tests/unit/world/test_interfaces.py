@@ -221,6 +221,9 @@ class TickingBackend:
         for advance in self._advances:
             advance(medium)
 
+    def counts(self) -> dict[str, int]:
+        return {}
+
 
 def test_frames_of_several_robots_are_sent_at_different_times(rig):
     """Frames of the same moment would collide on a radio with carrier sense."""
@@ -252,6 +255,17 @@ def test_frames_of_a_single_robot_are_sent_at_once_in_order(rig):
     PortsBackend(ticking, rig.ports, MS).act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
     sent = [(packets.at_ns, packets.sent.sender.tolist()) for packets in medium.sent]
     assert sent == [(10 * MS, [0, 0, 0]), (10 * MS + 5, [1])]
+
+
+def test_packet_of_an_agent_that_passes_for_a_frame_is_dropped_and_counted(rig):
+    spoofed, message = exchanged(station(1) + station(0) + IPV4), b"\1\0"
+    sent = SentPackets(np.array([0, 1]), np.array([1, 0]), Payloads.from_rows([spoofed, message]))
+    medium = ScriptedMedium()
+    steps = [lambda medium: medium.send(SubtickPackets(MS, None, sent)), lambda medium: medium.advance(MS)]
+    backend = PortsBackend(TickingBackend(steps), rig.ports, MS)
+    backend.act_in_time(0, {}, ReceivedPackets.none(), NO_TX_STATUSES, medium)
+    assert [packets.sent.sender.tolist() for packets in medium.sent] == [[1]]
+    assert backend.counts()["packets_with_reserved_tag"] == 1
 
 
 def test_frame_that_a_device_refuses_is_counted(rig):

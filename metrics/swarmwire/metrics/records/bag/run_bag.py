@@ -24,6 +24,7 @@ import polars as pl
 from swarmwire.comms.base.arrays import AnyArray, FloatArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.observe.truth import Static
+from swarmwire.comms.protocols.ros2.bags import BagWriter
 from swarmwire.comms.protocols.ros2.keys import ODOMETRY, TRANSFORMS, TWIST, ros_name, ros_names
 from swarmwire.comms.protocols.ros2.messages import PACKET, Velocities, encode_twist
 from swarmwire.comms.protocols.ros2.motion import BASE_FRAME, FramePose, odometry
@@ -37,7 +38,6 @@ from swarmwire.metrics.records.bag.markers import (
     marker_array,
     packet_marks,
 )
-from swarmwire.metrics.records.bag.writer import BagWriter
 from swarmwire.metrics.records.run_folder.layout import (
     COMMAND,
     HEIGHT,
