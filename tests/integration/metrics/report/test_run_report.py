@@ -265,8 +265,8 @@ def test_relayed_topics_are_reported_by_robot_and_in_all(tmp_path):
     }
     topic = {"topic": "map", "reliable": True, **totals, "repeated": 10, "requests": 12, "robots": robots}
     pace = {"factor": 1.0, "missed_ticks": 0, "worst_lag_s": 0.0, "subtick_s": None, "tick_jitter": None}
-    told = {**summary, "realtime": {**pace, "delivery": None}, "relay": [topic]}
-    (folder / "summary.json").write_text(json.dumps(told))
+    relayed = {**summary, "realtime": {**pace, "delivery": None}, "relay": [topic]}
+    (folder / "summary.json").write_text(json.dumps(relayed))
     assert table(run_report(folder), "Topic map over the radio") == {
         "flock-0": ("1,200", "5", "3,610", "4,800,000"),
         "flock-1": ("0", "1,100", "12", "240"),
