@@ -50,7 +50,8 @@ def open_sources(
             source = SOURCES[type(motion)](motion, names, rows, half_m if static.walled else (inf, inf), clock)
             _open(source, f"robots.{group.name}.motion", scenario.source)
             stack.callback(source.close)
-            report(f"poses of {group.name}: {source.address}")
+            exposed = " (from any machine that reaches it)" if source.is_exposed else ""
+            report(f"poses of {group.name}: {source.address}{exposed}")
             sources.append(source)
         yield tuple(sources)
 

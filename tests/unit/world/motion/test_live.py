@@ -269,3 +269,11 @@ def test_first_poses_are_not_waited_for_as_the_run_ends() -> None:
     clock, lines = StillClock(), list[str]()  # a clock that refuses to sleep
     wait_for_poses([given(clock)], clock, lines.append, lambda: True)
     assert lines == []
+
+
+@pytest.mark.parametrize(("host", "is_exposed"), [("127.0.0.1", False), ("0.0.0.0", True)])
+def test_source_beyond_loopback_is_exposed(host: str, is_exposed: bool) -> None:
+    source = UdpSource(UdpMotion(source="udp", listen=f"{host}:0"), ["a-0"], [0], (10.0, 5.0), WallClock())
+    source.open()
+    with closing(source):
+        assert source.is_exposed == is_exposed

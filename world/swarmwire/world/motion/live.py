@@ -54,10 +54,12 @@ class LiveSource(ABC):
 
     Attributes:
         address: where poses arrive; known from `open` on.
+        is_exposed: True if programs on other machines, too, can send poses, without a certificate.
         rows: the robot rows.
     """
 
     address: str
+    is_exposed = False
 
     def __init__(
         self, motion: LiveMotion, names: Sequence[str], rows: Sequence[int], half_m: tuple[float, float], clock: Clock

@@ -24,6 +24,7 @@ from swarmwire.comms.protocols.ros2.keys import (
 from swarmwire.comms.protocols.ros2.links import Subscription, check_endpoint, close, open_client, open_router
 from swarmwire.comms.protocols.ros2.messages import Messages
 from swarmwire.comms.protocols.ros2.poses import ONLY, poses_of, space_pose, transform_name
+from swarmwire.comms.wire.network import is_local
 from swarmwire.world.gateways.ros2.radio import RADIO_NODE, RosRadio
 from swarmwire.world.motion.live import LiveSource
 from swarmwire.world.scenario.motion import Ros2Motion
@@ -62,6 +63,7 @@ class Ros2Source(LiveSource):
         for endpoint in connect:
             self._threads.append(Thread(target=self._connect, args=(endpoint,), name="poses", daemon=True))
             self._threads[-1].start()
+        self.is_exposed = not all(map(is_local, listen))
         self.address = f"{next(iter(self._name_of))} at {', '.join((*opened, *connect))}"
 
     def close(self) -> None:

@@ -7,6 +7,7 @@ x and y are in the arena's frame, whose origin is its centre; z is the height of
 With `stamps` each message also has its time in s as `t_s`. Other keys are ignored.
 """
 
+import ipaddress
 import math
 import socket
 import threading
@@ -55,7 +56,9 @@ class DatagramSource(LiveSource):
         except OSError as error:
             raise BadInput(address, key, f"expected an address that is free: {error}") from error
         self._socket.settimeout(POLL_S)
-        self.address = f"udp {host}:{self._socket.getsockname()[1]}"
+        bound = self._socket.getsockname()
+        self.address = f"udp {host}:{bound[1]}"
+        self.is_exposed = not ipaddress.ip_address(bound[0]).is_loopback
         self._is_open = True
         self._thread = threading.Thread(target=self._receive, name="poses", daemon=True)
         self._thread.start()

@@ -16,6 +16,7 @@ import hashlib
 import importlib
 import json
 import platform
+import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -26,7 +27,7 @@ from typing import Any
 import tomli_w
 import yaml
 
-from swarmwire.comms.base.atomic import make_subfolder, write_bytes, write_text
+from swarmwire.comms.base.atomic import atomic_write, make_subfolder, write_text
 from swarmwire.comms.base.config import folder_of, from_toml, read_json
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import ONNX, file_of, resolve, with_file
@@ -170,8 +171,9 @@ def copy_scenario(scenario: Scenario, seeds: tuple[int, ...], copies: "Copies") 
     mapping = copied_mapping(scenario, copies)
     mapping["seed"] = seeds[0]
     text = f"{_header(scenario)}\n{tomli_w.dumps(mapping)}".encode()
-    write_bytes(copies.folder / SCENARIO, text)
-    return (CopiedFile(SCENARIO, _sha256(text), "scenario"), *copies.files)
+    copied = tuple(copies.files)
+    copies.write(SCENARIO, text, "scenario")
+    return (copies.files[-1], *copied)
 
 
 def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
@@ -229,7 +231,7 @@ def changed_files(files: tuple[CopiedFile, ...], folder: Path) -> list[str]:
     lines: list[str] = []
     for file in files:
         try:
-            if _sha256((folder / file.path).read_bytes()) != file.sha256:
+            if _sha256_of(folder / file.path) != file.sha256:
                 lines.append(f"{file.path} is not as the run left it: its sha256 differs")
         except OSError as error:
             lines.append(f"{file.path} cannot be read: {error.strerror}")
@@ -248,7 +250,7 @@ class Copies:
         """Copy a file once, or write `content` instead; return the path within the run folder."""
         if original not in self._paths:
             self._paths[original] = self._free_path(original)
-            self._write(self._paths[original], original.read_bytes() if content is None else content, role)
+            self.write(self._paths[original], original if content is None else content, role)
         return self._paths[original]
 
     def add_trace(self, original: Path, role: str) -> str:
@@ -257,7 +259,7 @@ class Copies:
             self._paths[original] = self._free_path(original)
             for file in files_of(original):
                 path = Path(self._paths[original], file.relative_to(original))
-                self._write(path.as_posix(), file.read_bytes(), role)
+                self.write(path.as_posix(), file, role)
         return self.add(original, role)
 
     def class_of(self, spec: str, folder: Path, role: str) -> str:
@@ -271,11 +273,16 @@ class Copies:
             return self.class_of(item, folder, "metric")
         return {**item, "metric": self.class_of(item["metric"], folder, "metric")}
 
-    def _write(self, path: str, data: bytes, role: str) -> None:
+    def write(self, path: str, content: bytes | Path, role: str) -> None:
+        """Write a file: these bytes, or a copy of another one, in parts since bags may exceed the memory."""
         for parent in reversed(Path(path).parents):
             make_subfolder(self.folder / parent)
-        write_bytes(self.folder / path, data)
-        self.files.append(CopiedFile(path, _sha256(data), role))
+        with atomic_write(self.folder / path) as aside:
+            if isinstance(content, bytes):
+                aside.write_bytes(content)
+            else:
+                shutil.copyfile(content, aside)
+            self.files.append(CopiedFile(path, _sha256_of(aside), role))
 
     def _free_path(self, original: Path) -> str:
         used, path, number = set(self._paths.values()), f"{FILES}/{original.name}", 1
@@ -290,5 +297,6 @@ def _header(scenario: Scenario) -> str:
     return f"# As run by swarmwire {version('swarmwire-deploy')}, from {source}, with overrides and seed as run.\n"
 
 
-def _sha256(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()
+def _sha256_of(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
