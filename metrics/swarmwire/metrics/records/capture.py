@@ -24,7 +24,8 @@ import polars as pl
 
 from swarmwire.comms.base.atomic import output_file
 from swarmwire.comms.base.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, exchanged, station
-from swarmwire.comms.radio.config.radio import Radio, acknowledgement_ns
+from swarmwire.comms.radio.config.frames import acknowledgement_ns
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
 from swarmwire.comms.robot.packets import FATE_NAMES, TAG_BYTES
 

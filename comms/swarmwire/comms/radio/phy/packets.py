@@ -10,7 +10,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import AnyArray, IntArray, Table
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_PACKET, NO_ROBOT, NO_TX_STATUS, NOWHERE, UNDER_WAY
-from swarmwire.comms.radio.config.radio import Radio, airtime_ns
+from swarmwire.comms.radio.config.frames import airtime_ns
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.links import fill_remainder
 from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET
 from swarmwire.comms.radio.propagation.decibels import to_db

@@ -6,14 +6,14 @@ import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import to_ns
-from swarmwire.comms.radio.config.phy import METHODS
-from swarmwire.comms.radio.config.radio import (
-    Radio,
+from swarmwire.comms.radio.config.frames import (
     acknowledgement_bytes,
     acknowledgement_ns,
     acknowledgement_rate_bps,
     eifs_acknowledgement_ns,
 )
+from swarmwire.comms.radio.config.phy import METHODS
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.phy.link_table import Thresholds
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, receiver_for, sensitivity_of
 from swarmwire.comms.radio.phy.reception import log_success_table

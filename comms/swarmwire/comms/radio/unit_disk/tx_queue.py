@@ -13,7 +13,8 @@ import numpy as np
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, IntArray
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import ABSENT, UNDER_WAY
-from swarmwire.comms.radio.config.radio import Radio, airtime_ns
+from swarmwire.comms.radio.config.frames import airtime_ns
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import DROP, NEWEST, Disruption
 from swarmwire.comms.radio.transmissions import (
     DUE,

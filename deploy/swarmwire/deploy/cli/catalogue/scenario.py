@@ -12,8 +12,8 @@ import numpy as np
 
 from swarmwire.comms.base.config import bounds_of
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.radio.config.frames import airtime_ns
 from swarmwire.comms.radio.config.presets import PRESETS, Preset
-from swarmwire.comms.radio.config.radio import airtime_ns
 from swarmwire.comms.radio.phy.propagation import range_of
 from swarmwire.comms.radio.stages.chain import ORDER
 from swarmwire.comms.radio.stages.loss import FrameLoss
