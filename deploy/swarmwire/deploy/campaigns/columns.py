@@ -33,8 +33,9 @@ LATENCIES = ("latency_air_s", "latency_agent_s")
 KEYS = ("run", "point", "seed")
 ENDS = ("ended", "error", "ticks", "sim_time_s", "trajectory_sha256")
 STOPPED_BY = "stopped_by"
+LATE = "timing_late"  # share of late frames or ticks, in real time
 MACHINE = ("timing_wall_s", "machine_cpu", "machine_host", "machine_worker")
-FIXED = {*KEYS, *ENDS, STOP_TIME, STOPPED_BY, *MACHINE}
+FIXED = {*KEYS, *ENDS, STOP_TIME, STOPPED_BY, LATE, *MACHINE}
 COUNTS, FATES = "counts.", "radio.fates."
 INTEGERS = {*KEYS, "ticks", "radio.sent", "radio.intended", "radio.in_range"}
 TEXTS = {"ended", "error", "trajectory_sha256", STOPPED_BY, "machine_cpu", "machine_host", "machine_worker"}
@@ -133,13 +134,14 @@ class ResultColumns:
         after = [name for name in responses if name != STOP_TIME]
         stop = [STOP_TIME, STOPPED_BY] if STOP_TIME in responses else []
         self._fixed = [*KEYS, *varied, *ENDS, *stop, *after]
+        self._machine = [LATE, *MACHINE] if campaign.realtime else MACHINE
 
     def frame(self, rows: Sequence[Row]) -> "pl.DataFrame":
         """Return rows as a table: all fixed columns, null if a row lacks them, and the counts of any row."""
         import polars as pl
 
         counts = sorted({name for row in rows for name in row if name.startswith(COUNTS)})
-        names = [*self._fixed, *counts, *MACHINE]
+        names = [*self._fixed, *counts, *self._machine]
         types = {"integer": pl.Int64(), "text": pl.String(), "number": pl.Float64(), "boolean": pl.Boolean()}
         schema = {name: types[self._type(name)] for name in names}
         return pl.DataFrame([{name: self._cell(name, row.get(name)) for name in names} for row in rows], schema)
@@ -151,7 +153,7 @@ class ResultColumns:
         table = pl.concat(frames, how="diagonal").unique(subset="run", keep="last").sort("run")
         counts = sorted(name for name in table.columns if name.startswith(COUNTS))
         zero = pl.when(pl.col("ended") != FAILED).then(pl.col(counts).fill_null(0)).otherwise(pl.col(counts))
-        return table.with_columns(zero if counts else []).select(*self._fixed, *counts, *MACHINE)
+        return table.with_columns(zero if counts else []).select(*self._fixed, *counts, *self._machine)
 
     def _type(self, name: str) -> str:
         if name in self._varied:

@@ -189,6 +189,9 @@ class CampaignRun:
         self._campaign = campaign = read_campaign(path)
         if not 0 <= run < campaign.runs:
             raise BadInput("run", "", f"expected a run from 0 to {campaign.runs - 1}, got {run}")
+        if campaign.realtime:
+            expected = "expected a run folder (--record-seeds): runs in real time depend on more than their seed"
+            raise BadInput(str(path), "realtime", expected)
         self.simulation = Simulation(
             CampaignWriter(path, campaign).scenario,
             seeds=[campaign.seed_of(run)],

@@ -105,7 +105,7 @@ def tasks_of(
 ) -> list[Task]:
     """Return a task for each batch of runs that are not `done`; each recorded run has a separate task."""
     seeds, tasks = len(campaign.seeds), list[Task]()
-    size = batch or campaign.batch or default_batch(campaign, workers)
+    size = 1 if campaign.realtime else batch or campaign.batch or default_batch(campaign, workers)
     for point in range(len(campaign.points)):
         missing = [run for run in range(point * seeds, (point + 1) * seeds) if run not in done]
         recorded = [run for run in missing if campaign.seed_of(run) in campaign.record_seeds]
@@ -144,6 +144,8 @@ def _task(campaign: Campaign, folder: CampaignWriter, point: int, runs: Sequence
         seeds=tuple(campaign.seed_of(run) for run in runs),
         series=campaign.series,
         record_to=str(folder.run_folder(runs[0])) if recorded else None,
+        realtime=campaign.realtime,
+        max_late=campaign.max_late,
     )
 
 

@@ -18,9 +18,9 @@ from swarmwire.deploy.campaigns.design import (
     vary_from,
     whole_numbers,
 )
-from swarmwire.deploy.runs.config import SEEDS, seed_list
+from swarmwire.deploy.runs.config import SEEDS, parse_factor, seed_list
 from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, scenario_traces, selected_metrics
-from swarmwire.metrics.records.campaign.campaign_json import Response
+from swarmwire.metrics.records.campaign.campaign_json import MAX_LATE, Response
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 from swarmwire.world.scenario_file import load_scenario, scenario_from
@@ -45,6 +45,8 @@ class SweepSpec:
     batch: int | None = None
     series: bool = True
     record_seeds: tuple[int, ...] = ()
+    realtime: float | None = None  # simulated s per s of wall time; None: as fast as the machine allows
+    max_late: float = MAX_LATE
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,10 @@ def plan_of(spec: SweepSpec) -> CampaignPlan:
         raise BadInput("record_seeds", "", f"expected seeds of the campaign, got {strange[0]}")
     if spec.batch is not None and spec.batch < 1:
         raise BadInput("batch", "", f"expected at least 1, got {spec.batch}")
+    if parse_factor(spec.realtime) is not None and (spec.batch or 1) > 1:
+        raise BadInput("batch", "", f"expected 1 in real time, where each run has a world of its own, got {spec.batch}")
+    if not 0.0 <= spec.max_late <= 1.0:
+        raise BadInput("max_late", "", f"expected a share from 0 to 1, got {spec.max_late:g}")
     mapping = mapping_of(scenario)
     scenarios, code = list[Scenario](), dict[str, None]()
     for point in points:
@@ -166,6 +172,8 @@ class CampaignFile:
     batch: int | None = None
     series: bool = True
     record_seeds: int | str | list[int] = field(default_factory=list[int])
+    realtime: float | None = None
+    max_late: float = MAX_LATE
 
 
 def campaign_file(path: Path) -> CampaignFile | None:
@@ -204,6 +212,8 @@ def spec_in(path: Path, file: CampaignFile, seeds: str | None = None) -> SweepSp
         batch=file.batch,
         series=file.series,
         record_seeds=seed_list(file.record_seeds, f"{where}: record_seeds") if file.record_seeds else (),
+        realtime=file.realtime,
+        max_late=file.max_late,
     )
 
 

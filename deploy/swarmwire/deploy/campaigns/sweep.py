@@ -11,16 +11,18 @@ from swarmwire.comms.base.atomic import folder_lock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.design import GRID, vary_from
 from swarmwire.deploy.campaigns.folder import check_resumable, copied_overrides, new_folder, provenance
+from swarmwire.deploy.campaigns.local import usable_cores
 from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, OnResult, execute, open_executor, tasks_of
 from swarmwire.deploy.campaigns.spec import CampaignPlan, SweepSpec, plan_of
 from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
-from swarmwire.deploy.runs.config import SeedsOption, seed_list
+from swarmwire.deploy.runs.config import SeedsOption, parse_factor, seed_list
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.record.folder import stamped_folder
 from swarmwire.deploy.runs.record.provenance import Copies
 from swarmwire.metrics.records.campaign.campaign_json import (
     FAILED,
+    MAX_LATE,
     SCENARIO_FOLDER,
     Campaign,
     Design,
@@ -30,8 +32,9 @@ from swarmwire.metrics.records.campaign.campaign_json import (
 from swarmwire.world.scenario.scenario import Scenario
 
 CAMPAIGNS = "campaigns"  # default folder of campaigns
+CORES_PER_RUN = 2  # in real time: one for the world, one for its programs
 # Fields that must be equal in a plan and in the campaign that it resumes.
-COMPARED_FIELDS = ("files", "overrides", "design", "seeds", "vary", "points")
+COMPARED_FIELDS = ("files", "overrides", "design", "seeds", "vary", "points", "realtime")
 
 
 def campaign_of(plan: CampaignPlan, scenario_folder: Path, command: str) -> Campaign:
@@ -54,6 +57,8 @@ def campaign_of(plan: CampaignPlan, scenario_folder: Path, command: str) -> Camp
         series=spec.series,
         record_seeds=spec.record_seeds,
         batch=spec.batch,
+        realtime=parse_factor(spec.realtime),
+        max_late=spec.max_late,
     )
 
 
@@ -143,6 +148,8 @@ def sweep(
     batch: int | None = None,
     series: bool = True,
     record_seeds: SeedsOption = (),
+    realtime: float | None = None,
+    max_late: float = MAX_LATE,
     executor: str = LOCAL,
     workers: int | None = None,
     observer: CampaignObserver | None = None,
@@ -154,6 +161,9 @@ def sweep(
     "latin", which draw `points` points from ranges without count. `out` is a new or empty folder, by default
     campaigns/<scenario>-<UTC>. At most `batch` arenas form a world. With `series` each tick's metrics are recorded,
     too; runs of `record_seeds` get run folders. Ctrl-C ends the campaign; `resume` continues it.
+
+    With `realtime`, simulated seconds per second of wall time, agents and programs on network interfaces run by the
+    clock: each run has a world of its own, and fails if a share above `max_late` of its frames or ticks was late.
 
     Raises BadInput for invalid arguments, before the first run, and StorageFailed if the disk is full. An exception of
     a run is in its row.
@@ -171,6 +181,8 @@ def sweep(
         batch=batch,
         series=series,
         record_seeds=seed_list(record_seeds, "record_seeds") if record_seeds else (),
+        realtime=realtime,
+        max_late=max_late,
     )
     plan = plan_of(spec)
     folder = Path(out) if out is not None else stamped_folder(Path(CAMPAIGNS, _stem(scenario)))
@@ -199,7 +211,7 @@ def resume(
 
 def begin_sweep(plan: CampaignPlan, path: Path, command: str, options: ExecutionOptions) -> Sweep:
     """Make the folder of a checked campaign, and run it; `command` is recorded in it."""
-    with _executor(options, path) as executor:
+    with _executor(options, path, parse_factor(plan.spec.realtime)) as executor:
         with new_folder(path, "campaign") as scenario_folder:
             campaign = campaign_of(plan, scenario_folder, command)
             write_campaign(campaign, path)  # last: the folder has all files of the scenario by then
@@ -221,18 +233,24 @@ def resume_sweep(
         check_same(plan, campaign, path)
     check_resumable(campaign, path, force=force)
     folder = CampaignWriter(path, campaign)
-    with _executor(options, path) as executor, folder_lock(path, "campaign"):
+    with _executor(options, path, campaign.realtime) as executor, folder_lock(path, "campaign"):
         folder.clear()
         ended = {run: how for run, how in folder.ended().items() if not (retry_failed and how == FAILED)}
         return _work(folder, ended, executor, options)
 
 
 @contextmanager
-def _executor(options: ExecutionOptions, path: Path) -> Generator[Executor]:
+def _executor(options: ExecutionOptions, path: Path, realtime: float | None) -> Generator[Executor]:
     if not isinstance(options.executor, str):
         yield options.executor
         return
-    with closing(open_executor(options.executor, options.workers, path / SCENARIO_FOLDER)) as executor:
+    workers = options.workers
+    if realtime:
+        if options.executor != LOCAL:
+            expected = f"expected {LOCAL} in real time: other workers' machines may be busy, or without rights"
+            raise BadInput("executor", "", f"{expected}; got {options.executor!r}")
+        workers = workers or max(1, usable_cores() // CORES_PER_RUN)
+    with closing(open_executor(options.executor, workers, path / SCENARIO_FOLDER)) as executor:
         yield executor
 
 

@@ -18,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmwire.comms.base.clock import Clock, WallClock, to_ns, to_s
-from swarmwire.comms.base.errors import Interrupted
+from swarmwire.comms.base.errors import Interrupted, SwarmwireError
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.deploy.campaigns.columns import Row, failed_row, row_of
+from swarmwire.deploy.campaigns.columns import LATE, Row, failed_row, row_of
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.record import provenance
+from swarmwire.deploy.runs.result import Result
 from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.records.run_folder.writer import PARQUET
@@ -43,6 +44,8 @@ class Task:
     seeds: tuple[int, ...]  # seed of each run
     series: bool = True  # True to record each tick's metrics
     record_to: str | None = None  # path of the run folder, for a single recorded run
+    realtime: float | None = None  # simulated s per s of wall time, for a single run; None: as fast as possible
+    max_late: float = 1.0  # in real time: largest share of late frames or ticks of a run that counts
 
     def split(self) -> "tuple[Task, Task]":
         """Split two or more runs into two tasks."""
@@ -152,7 +155,7 @@ def _try(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes | None
 def _run_batch(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes | None]:
     """Run all seeds of a task in one world; return a row for each run, and their series."""
     out = None if task.record_to is None else _temporary_folder(Path(task.record_to))
-    simulation = Simulation(task.scenario, seeds=task.seeds, overrides=task.overrides, out=out)
+    simulation = Simulation(task.scenario, seeds=task.seeds, overrides=task.overrides, out=out, realtime=task.realtime)
     simulation.watch(Alive(alive, simulation.interrupt))
     series = TickSeries(simulation.metrics)
     if task.series:
@@ -166,8 +169,25 @@ def _run_batch(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes 
         if out is not None and out.exists():
             out.replace(str(task.record_to))
     times = {metric.name for metric in simulation.metrics.metrics if metric.kind == "time"}
-    rows = [row_of(arena, times) for arena in simulation.result.arenas]
+    late = late_share(simulation.result)
+    if late > task.max_late:
+        raise RanLate(late, task.max_late)
+    rows: list[Row] = [row_of(arena, times) | {LATE: late} for arena in simulation.result.arenas]
     return rows, series.parquet(task.runs, [row["ticks"] for row in rows]) if task.series else None
+
+
+def late_share(result: Result) -> float:
+    """Return the share of late frames of a run in real time, or that of late ticks if it is larger; else 0."""
+    ticks = result.realtime.missed_ticks / max(1, result.ticks) if result.realtime else 0.0
+    frames = result.interfaces.late / max(1, result.interfaces.delivered) if result.interfaces else 0.0
+    return max(ticks, frames)
+
+
+class RanLate(SwarmwireError):
+    """A run in real time did not keep up, so its result is that of a busy machine."""
+
+    def __init__(self, late: float, max_late: float) -> None:
+        super().__init__(f"late: {late:.1%} of its frames or ticks, more than max_late = {max_late:.1%}")
 
 
 def _temporary_folder(folder: Path) -> Path:

@@ -62,6 +62,21 @@ class SweepOptions:
     record_seeds: Annotated[
         str | None, typer.Option(help="Seeds whose runs get full run folders; as for --seeds.", metavar="SEEDS")
     ] = None
+    realtime: Annotated[
+        str | None,
+        typer.Option(
+            help="Run at this many simulated seconds per second, with programs on network interfaces if the scenario "
+            "has them.",
+            metavar="FACTOR",
+        ),
+    ] = None
+    max_late: Annotated[
+        float | None,
+        typer.Option(
+            help="In real time, largest share of late frames or ticks of a run that does not fail. Default: 0.01.",
+            metavar="SHARE",
+        ),
+    ] = None
     resume: Annotated[
         Path | None, typer.Option(help="Run only the missing runs of the campaign in this folder.", metavar="DIR")
     ] = None

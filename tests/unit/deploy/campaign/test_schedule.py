@@ -61,6 +61,8 @@ def made(points, seeds, robots=10, recorded=(), duration_s=60.0):
         series=True,
         record_seeds=recorded,
         batch=None,
+        realtime=None,
+        max_late=0.01,
         vary={},
         responses=(),
     )

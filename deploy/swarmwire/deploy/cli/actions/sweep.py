@@ -16,8 +16,9 @@ from swarmwire.deploy.cli.display.sweep import SweepProgress, print_sweep
 from swarmwire.deploy.cli.options import INTERRUPTED, leaving_when_hung_up
 from swarmwire.deploy.cli.sweep import SweepOptions
 from swarmwire.deploy.machine import command_path
-from swarmwire.deploy.runs.config import SEEDS, seed_list
+from swarmwire.deploy.runs.config import SEEDS, parse_factor, seed_list
 from swarmwire.deploy.runs.controls import Interrupt
+from swarmwire.deploy.runs.interfaces import enter_user_namespace
 from swarmwire.deploy.runs.record.folder import stamped_folder
 from swarmwire.deploy.terminal.console import TerminalConsole
 
@@ -25,6 +26,8 @@ from swarmwire.deploy.terminal.console import TerminalConsole
 def run_sweep(options: SweepOptions) -> None:
     """Begin or resume a campaign, and print its progress and its medians."""
     plan = _plan(options)
+    if plan and plan.spec.realtime and plan.scenario.radio and plan.scenario.radio.interface:
+        enter_user_namespace()
     console, interrupt = TerminalConsole(quiet=options.quiet), Interrupt()
     execution = ExecutionOptions(options.executor, options.workers, options.batch, SweepProgress(console), interrupt)
     with leaving_when_hung_up(interrupt):
@@ -74,5 +77,7 @@ def _settings(options: SweepOptions) -> dict[str, Any]:
         "batch": options.batch,
         "record_seeds": None if options.record_seeds is None else seed_list(options.record_seeds, "record_seeds"),
         "series": None if options.series else False,
+        "realtime": parse_factor(options.realtime),
+        "max_late": options.max_late,
     }
     return {name: value for name, value in settings.items() if value is not None}

@@ -185,6 +185,10 @@ def copied_mapping(scenario: Scenario, copies: "Copies") -> dict[str, Any]:
         body = sheet_path(group["body"], scenario.source)
         if body is not None:
             group["body"] = _copied_body(body, copies)
+        if "program" in group:
+            files = [folder / part for part in group["program"]]
+            copied = [copies.add(file.resolve(), "program") if file.is_file() else "" for file in files]
+            group["program"] = [copy or part for copy, part in zip(copied, group["program"], strict=True)]
     if "metrics" in mapping:
         mapping["metrics"] = [copies.metric(item, folder) for item in mapping["metrics"]]
     trace = trace_path(scenario)
@@ -281,7 +285,7 @@ class Copies:
             if isinstance(content, bytes):
                 aside.write_bytes(content)
             else:
-                shutil.copyfile(content, aside)
+                shutil.copy(content, aside)  # also its mode: programs are executable
             self.files.append(CopiedFile(path, _sha256_of(aside), role))
 
     def _free_path(self, original: Path) -> str:
