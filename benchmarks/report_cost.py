@@ -99,4 +99,6 @@ def _about(points: list[tuple[float, int]], seeds: int) -> Campaign:
         series=False,
         record_seeds=(),
         batch=None,
+        realtime=None,
+        max_late=0.01,
     )

@@ -126,6 +126,8 @@ def _about(
         "series": False,
         "record_seeds": [],
         "batch": None,
+        "realtime": None,
+        "max_late": 0.01,
     }
 
 

@@ -20,13 +20,14 @@ from swarmwire.deploy.campaigns.design import (
 )
 from swarmwire.deploy.runs.config import SEEDS, parse_factor, seed_list
 from swarmwire.deploy.runs.scenario_parts import agent_specs, check_agents, scenario_traces, selected_metrics
-from swarmwire.metrics.records.campaign.campaign_json import MAX_LATE, Response
+from swarmwire.metrics.records.campaign.campaign_json import Response
 from swarmwire.world.scenario.bodies import bodies_of, custom_code_of
 from swarmwire.world.scenario.scenario import Scenario, mapping_of
 from swarmwire.world.scenario_file import load_scenario, scenario_from
 
 MAX_RUNS = 10_000_000
 FORMAT = 1
+MAX_LATE = 0.01  # share of late frames or ticks in real time
 SCENARIO_KEYS = ("arena", "robots", "duration_s")  # keys of scenarios that a campaign's file never has
 
 

@@ -13,7 +13,7 @@ from swarmwire.deploy.campaigns.design import GRID, vary_from
 from swarmwire.deploy.campaigns.folder import check_resumable, copied_overrides, new_folder, provenance
 from swarmwire.deploy.campaigns.local import usable_cores
 from swarmwire.deploy.campaigns.schedule import LOCAL, Executor, OnResult, execute, open_executor, tasks_of
-from swarmwire.deploy.campaigns.spec import CampaignPlan, SweepSpec, plan_of
+from swarmwire.deploy.campaigns.spec import MAX_LATE, CampaignPlan, SweepSpec, plan_of
 from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
 from swarmwire.deploy.runs.config import SeedsOption, parse_factor, seed_list
@@ -22,7 +22,6 @@ from swarmwire.deploy.runs.record.folder import stamped_folder
 from swarmwire.deploy.runs.record.provenance import Copies
 from swarmwire.metrics.records.campaign.campaign_json import (
     FAILED,
-    MAX_LATE,
     SCENARIO_FOLDER,
     Campaign,
     Design,

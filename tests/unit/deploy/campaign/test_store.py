@@ -31,6 +31,8 @@ CAMPAIGN = Campaign(
     series=True,
     record_seeds=(),
     batch=None,
+    realtime=None,
+    max_late=0.01,
 )
 
 

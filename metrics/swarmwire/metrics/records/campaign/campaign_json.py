@@ -30,7 +30,6 @@ SERIES = "series"  # the metrics of every tick
 SCENARIO_FOLDER = "scenario"  # the scenario's files
 FINAL = ".final"  # suffix of the columns of a metric's last value
 LINK_PDR = "radio.link_pdr"  # column of received / receivers in range
-MAX_LATE = 0.01  # share
 ROUNDING = 1e-9  # relative: 0.1 + 0.2 is 0.3
 EXPECTED_CONTENT = "expected the content that swarmwire writes at the start of a campaign"
 
@@ -94,8 +93,8 @@ class Campaign(Provenance):
     series: bool  #: True if each tick's metrics are recorded
     record_seeds: tuple[int, ...]  #: seeds whose runs have run folders
     batch: int | None  #: largest number of arenas in a world; None: chosen by the schedule
-    realtime: float | None = None  #: simulated s per s of wall time; None: as fast as the machine allows
-    max_late: float = MAX_LATE  #: in real time: a run with a larger share of late frames, or late ticks, has failed
+    realtime: float | None  #: simulated s per s of wall time; None: as fast as the machine allows
+    max_late: float  #: in real time: a run with a larger share of late frames, or late ticks, has failed
 
     @property
     def runs(self) -> int:
