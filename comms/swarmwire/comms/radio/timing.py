@@ -4,7 +4,7 @@ Times are whole ns. Octets may be a number or an array of integers. Each standar
 add the headers of higher layers.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -27,6 +27,17 @@ OFDM_BITS_PER_SYMBOL = {
     48_000_000: 192,
     54_000_000: 216,
 }
+HT_BITS_PER_SYMBOL = {  # MCS 0 to 7 (20.6): one spatial stream in 20 MHz with the long guard interval
+    6_500_000: 26,
+    13_000_000: 52,
+    19_500_000: 78,
+    26_000_000: 104,
+    39_000_000: 156,
+    52_000_000: 208,
+    58_500_000: 234,
+    65_000_000: 260,
+}
+SIGNAL_EXTENSION_NS = 6 * US  # of OFDM frames at 2.4 GHz (19.8.3, 20.4.3)
 
 
 def at_bit_rate_ns(octets: Octets, bit_rate_bps: int) -> Octets:
@@ -52,8 +63,16 @@ def ieee80211a_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
 
 
 def ieee80211g_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
-    """Return the airtime of IEEE 802.11g (OFDM at 2.4 GHz): 802.11a and 6 us of signal extension (19.8.3)."""
-    return ieee80211a_ns(psdu_octets, rate_bps) + 6 * US
+    """Return the airtime of IEEE 802.11g (OFDM at 2.4 GHz): 802.11a and the signal extension (19.8.3)."""
+    return ieee80211a_ns(psdu_octets, rate_bps) + SIGNAL_EXTENSION_NS
+
+
+def ieee80211n_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
+    """Return the airtime of IEEE 802.11n at 5 GHz, HT-mixed: 36 us + 4 us x ceil((22 + 8 x PSDU) / bits per symbol).
+
+    The preamble has the fields of 802.11a (20 us), HT-SIG (8), HT-STF and one HT-LTF (4 each) (2009: 20.4.3).
+    """
+    return 36 * US - (-(22 + 8 * psdu_octets) // HT_BITS_PER_SYMBOL[rate_bps]) * 4 * US
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,14 +118,18 @@ class Dcf:
     cca_time_ns: int = 4 * US  # aCCATime of OFDM; that of DSSS is at most 15 us, and 4 us in ns-3
     cca_sensitivity_dbm: float = -82.0  # power of frames that make the medium busy (17.3.10.5)
     cca_ed_dbm: float = -62.0  # CCA-ED threshold, for any other energy
+    aifsn: int = 2  # slots of DIFS after SIFS; EDCA: AIFSN, of AIFS
 
     @property
     def difs_ns(self) -> int:
-        """DIFS: SIFS + 2 slots."""
-        return self.sifs_ns + 2 * self.slot_ns
+        """DIFS, or AIFS under EDCA: SIFS + `aifsn` slots."""
+        return self.sifs_ns + self.aifsn * self.slot_ns
 
 
 IEEE_802_15_4 = UnslottedCsma()
 IEEE_802_11B = Dcf(10 * US, 20 * US, 31)  # DSSS and CCK
 IEEE_802_11A = Dcf(16 * US, 9 * US, 15)  # OFDM at 5 GHz
 IEEE_802_11G = Dcf(10 * US, 20 * US, 15)  # OFDM in an ad hoc network (IBSS), which has no short slots (7.3.1.4)
+# EDCA with the parameters of best effort (2009: 7.3.2.29).
+IEEE_802_11N_2_GHZ = replace(IEEE_802_11G, aifsn=3)
+IEEE_802_11N_5_GHZ = replace(IEEE_802_11A, aifsn=3)

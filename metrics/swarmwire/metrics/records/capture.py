@@ -24,9 +24,9 @@ import polars as pl
 
 from swarmwire.comms.base.atomic import output_file
 from swarmwire.comms.base.ethernet import ADDRESS_BYTES, FRAME_TAG, HEADER_BYTES, exchanged, station
-from swarmwire.comms.radio.config.frames import acknowledgement_ns
+from swarmwire.comms.radio.config.frames import acknowledgement_ns, broadcast_rate_bps, dcf_of
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G
+from swarmwire.comms.radio.timing import HT_BITS_PER_SYMBOL
 from swarmwire.comms.robot.packets import FATE_NAMES, TAG_BYTES
 
 ETHERNET, IEEE802_15_4_TAP, IEEE802_11_RADIOTAP, USER0 = 1, 283, 127, 147
@@ -43,8 +43,10 @@ DATA, ACKNOWLEDGE, SAME_PAN, SHORT_TO, SHORT_FROM = 0x0001, 0x0020, 0x0040, 0x08
 
 RADIOTAP_FIELDS = 1 << 1 | 1 << 2 | 1 << 3  # flags, rate, channel
 RADIOTAP_STRENGTH = 1 << 5
+RADIOTAP_MCS = 1 << 19
+MCS_KNOWN = 0x0F  # bandwidth, index, guard interval and format are known: 20 MHz, long, HT-mixed
 CCK, OFDM, BAND_2_GHZ, BAND_5_GHZ = 0x0020, 0x0040, 0x0080, 0x0100  # channel flags
-DATA_FRAME = 0x0008  # frame control: data between stations of an ad hoc network
+DATA_FRAME, QOS_DATA_FRAME = 0x0008, 0x0088  # frame control: data between stations of an ad hoc network
 NETWORK = bytes.fromhex("025357000000")  # the BSSID
 SNAP = bytes.fromhex("aaaa03000000")  # LLC, before a type of Ethernet (IEEE 802)
 MAX_LENGTH = 1500  # bytes after Ethernet's header; greater numbers in its field are types, from 1536 on
@@ -140,14 +142,19 @@ def _headers_80211(radio: Radio, frame: CapturedFrame) -> bytes:
 
 
 def _radiotap(radio: Radio, frame: CapturedFrame) -> bytes:
-    """Encode radiotap version 0 (radiotap.org): flags, rate in 500 kbit/s, channel in MHz, strength in dBm."""
+    """Encode radiotap version 0 (radiotap.org): flags, rate in 500 kbit/s or MCS, channel in MHz, strength in dBm."""
     band = BAND_2_GHZ if radio.frequency_hz < 3e9 else BAND_5_GHZ
     kind = band | (CCK if radio.frame == "802.11b" else OFDM)
-    fields = struct.pack("<BBHH", 0, radio.bit_rate_bps // 500_000, round(radio.frequency_hz / 1e6), kind)
+    is_ht = radio.frame == "802.11n" and frame.to is not None
+    bit_rate_bps = radio.bit_rate_bps if frame.to is not None else broadcast_rate_bps(radio)
+    fields = struct.pack("<BBHH", 0, 0 if is_ht else bit_rate_bps // 500_000, round(radio.frequency_hz / 1e6), kind)
     present = RADIOTAP_FIELDS
     if frame.rssi_dbm is not None:
         present |= RADIOTAP_STRENGTH
         fields += struct.pack("<b", max(-128, min(round(frame.rssi_dbm), 127)))
+    if is_ht:
+        present |= RADIOTAP_MCS
+        fields += struct.pack("<BBB", MCS_KNOWN, 0, list(HT_BITS_PER_SYMBOL).index(radio.bit_rate_bps))
     return struct.pack("<BBHI", 0, 0, 8 + len(fields), present) + fields
 
 
@@ -170,7 +177,10 @@ def _data_frame(radio: Radio, frame: CapturedFrame, to: bytes) -> bytes:
     duration_us = 0 if frame.to is None else _duration_us(radio)
     sequence_control = (frame.sequence & 0xFFF) << 4  # fragment number 0 in the lower bits
     sender = station(frame.sender)
-    return struct.pack("<HH6s6s6sH", DATA_FRAME, duration_us, to, sender, NETWORK, sequence_control)
+    is_qos = radio.frame == "802.11n"
+    control = QOS_DATA_FRAME if is_qos else DATA_FRAME
+    header = struct.pack("<HH6s6s6sH", control, duration_us, to, sender, NETWORK, sequence_control)
+    return header + bytes(2) if is_qos else header  # QoS control: best effort
 
 
 def _ieee80211(radio: Radio, frame: CapturedFrame) -> bytes:
@@ -185,8 +195,7 @@ def _duration_us(radio: Radio) -> int:
     """Return the duration field of a unicast frame: SIFS and the acknowledgement."""
     if not (radio.access_or_default.acknowledged and radio.access_or_default.method == "dcf"):
         return 0
-    dcf = {"802.11a": IEEE_802_11A, "802.11b": IEEE_802_11B, "802.11g": IEEE_802_11G}[radio.frame]
-    return -(-(dcf.sifs_ns + acknowledgement_ns(radio)) // 1000)
+    return -(-(dcf_of(radio).sifs_ns + acknowledgement_ns(radio)) // 1000)
 
 
 def _ipv4(frame: CapturedFrame, data_bytes: int) -> bytes:

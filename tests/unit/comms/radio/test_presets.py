@@ -61,6 +61,7 @@ def preset(name: str, **others: Any) -> Radio:
     [
         *(("ieee802154", 0.25, 352), ("wifi-b-1M", 1, 304), ("wifi-b-1M", 11, 203)),
         *(("wifi-a-6M", 6, 44), ("wifi-a-6M", 9, 44), ("wifi-a-6M", 54, 28)),
+        *(("wifi-n-5G", 6.5, 44), ("wifi-n-5G", 19.5, 32), ("wifi-n-5G", 65, 28), ("wifi-n-2G", 65, 34)),
     ],
 )
 def test_acknowledgement_airtime_matches_the_standard(name: str, mbps: float, us: int):

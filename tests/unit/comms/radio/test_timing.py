@@ -21,6 +21,7 @@ from swarmwire.comms.radio.send_times import SendTimes
 from swarmwire.comms.radio.stages.delays import MAX_NS, delay_distribution, varying_delay_ns
 from swarmwire.comms.radio.timing import (
     DSSS_RATES_BPS,
+    HT_BITS_PER_SYMBOL,
     IEEE_802_11A,
     IEEE_802_11B,
     IEEE_802_11G,
@@ -31,6 +32,7 @@ from swarmwire.comms.radio.timing import (
     ieee80211a_ns,
     ieee80211b_ns,
     ieee80211g_ns,
+    ieee80211n_ns,
 )
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 from tests.support.comms.radio import TICK_NS, at, everybody, make_medium, packets, run, scattered, with_access
@@ -152,6 +154,20 @@ def test_airtime_of_802_11b_matches_ns3(octets: int, rate_bps: int, short_preamb
 def test_airtime_of_802_11a_and_g_matches_ns3(octets: int, a_us: int, g_us: int):
     assert ieee80211a_ns(octets, 54_000_000) == a_us * US
     assert ieee80211g_ns(octets, 54_000_000) == g_us * US
+
+
+@pytest.mark.parametrize(("octets", "stated_us"), [(1536, 228), (76, 48), (14, 40), (9094, 1156), (43962, 5448)])
+def test_airtime_of_802_11n_matches_ns3(octets: int, stated_us: int):
+    """MCS 7 in 20 MHz: ns-3's test of durations, and A-MPDU of 6 and 29 packets of 1472 octets."""
+    assert ieee80211n_ns(octets, 65_000_000) == stated_us * US
+
+
+def test_bits_per_symbol_of_802_11n_are_those_of_52_subcarriers():
+    """52 data subcarriers x bits of the constellation x code rate; a symbol takes 4 us."""
+    codes = map(Fraction, ("1/2", "1/2", "3/4", "1/2", "3/4", "2/3", "3/4", "5/6"))
+    modes = zip((1, 2, 2, 4, 4, 6, 6, 6), codes, strict=True)
+    by_rate = {int(52 * bits * code * 250_000): int(52 * bits * code) for bits, code in modes}
+    assert by_rate == HT_BITS_PER_SYMBOL
 
 
 def test_airtime_of_a_hundred_octets_over_udp_matches_the_source():

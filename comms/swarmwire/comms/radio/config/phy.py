@@ -13,7 +13,7 @@ from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.radio.timing import DSSS_RATES_BPS, OFDM_BITS_PER_SYMBOL
+from swarmwire.comms.radio.timing import DSSS_RATES_BPS, HT_BITS_PER_SYMBOL, OFDM_BITS_PER_SYMBOL
 
 FADINGS = ("rayleigh", "rician", "nakagami")
 
@@ -122,8 +122,8 @@ def _or(values: FloatArray, default: float) -> FloatArray:
 
 RATES_BPS = {
     "802.11b": DSSS_RATES_BPS,
-    "802.11ag": tuple(OFDM_BITS_PER_SYMBOL),
-    "802.11ag-nist": tuple(OFDM_BITS_PER_SYMBOL),
+    "802.11ag": (*OFDM_BITS_PER_SYMBOL, *HT_BITS_PER_SYMBOL),
+    "802.11ag-nist": (*OFDM_BITS_PER_SYMBOL, *HT_BITS_PER_SYMBOL),
 }
 
 

@@ -160,6 +160,14 @@ _WIFI: dict[str, Any] = {
     "antenna": {"power_dbm": 16.0},
     "access": {"method": "dcf"},
 }
+_WIFI_N: dict[str, Any] = {
+    **_WIFI,
+    "bit_rate_bps": 65_000_000,
+    "overhead_bytes": 66,  # two bytes of QoS control beyond those of 802.11a
+    "frame": "802.11n",
+    "noise": {"bandwidth_hz": 20e6, "figure_db": 7.0},
+    "reception": {"model": "802.11ag", "preamble_sinr_db": 4.0, "preamble_dbm": -82.0, "capture_window_s": 4e-6},
+}
 STANDARDS: dict[str, Preset] = {
     "ieee802154": Preset(
         "IEEE 802.15.4 at 2.4 GHz, 0 dBm, sensitivity -101 dBm, unslotted CSMA/CA, short addresses",
@@ -195,6 +203,16 @@ STANDARDS: dict[str, Preset] = {
                 "capture_window_s": 4e-6,
             },
         },
+    ),
+    "wifi-n-2G": Preset(
+        "IEEE 802.11n ad hoc at 65 Mbit/s (MCS 7, one stream, 20 MHz) in channel 1, UDP over IPv4",
+        "IEEE 802.11n-2009; power, noise figure, preamble and queue as in ns-3",
+        {**_WIFI_N, "frequency_hz": 2.412e9},
+    ),
+    "wifi-n-5G": Preset(
+        "IEEE 802.11n ad hoc at 65 Mbit/s (MCS 7, one stream, 20 MHz) in channel 36, UDP over IPv4",
+        "IEEE 802.11n-2009; power, noise figure, preamble and queue as in ns-3",
+        {**_WIFI_N, "frequency_hz": 5.18e9},
     ),
     "ble-1M": Preset(
         "Bluetooth LE advertising at 1 Mbit/s, 0 dBm, sensitivity -96 dBm: 27 bytes, sent without listening",

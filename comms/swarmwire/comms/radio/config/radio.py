@@ -23,7 +23,7 @@ from swarmwire.comms.radio.config.phy import (
     refuse_unfit,
 )
 from swarmwire.comms.radio.config.presets import PRESETS
-from swarmwire.comms.radio.timing import DSSS_RATES_BPS, OFDM_BITS_PER_SYMBOL
+from swarmwire.comms.radio.timing import DSSS_RATES_BPS, HT_BITS_PER_SYMBOL, OFDM_BITS_PER_SYMBOL
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ DATAGRAM_BYTES = 28  # IPv4 and UDP headers
 MIN_MTU_BYTES = 68  # IPv4 (RFC 791)
 POSITIONS = ("held", "interpolated")
 MODELS = ("unit-disk", "log-distance", "friis", "two-ray", "itu-indoor")
-FRAMES = ("plain", "802.11a", "802.11b", "802.11g")
+FRAMES = ("plain", "802.11a", "802.11b", "802.11g", "802.11n")
 
 
 @dataclass(frozen=True)
@@ -234,11 +234,17 @@ class Radio:
 PHY_KEYS = ("antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")
 MODEL_KEYS = {"log_distance": "log-distance", "two_ray": "two-ray", "itu_indoor": "itu-indoor"}
 OFDM_MODELS = ("802.11ag", "802.11ag-nist")
-RECEPTIONS = {"802.11a": OFDM_MODELS, "802.11b": ("802.11b",), "802.11g": OFDM_MODELS}  # besides threshold and table
+RECEPTIONS = {  # besides threshold and table
+    "802.11a": OFDM_MODELS,
+    "802.11b": ("802.11b",),
+    "802.11g": OFDM_MODELS,
+    "802.11n": OFDM_MODELS,
+}
 RATES_BPS = {
     "802.11a": tuple(OFDM_BITS_PER_SYMBOL),
     "802.11b": DSSS_RATES_BPS,
     "802.11g": tuple(OFDM_BITS_PER_SYMBOL),
+    "802.11n": tuple(HT_BITS_PER_SYMBOL),
 }
 
 

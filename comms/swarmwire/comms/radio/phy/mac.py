@@ -85,6 +85,7 @@ def send(params, state, events, buffer, r, now_ns):
         packet.fate = state.switch.drop_fate[r]
         robot.first_link = robot.weak_link = robot.stop_link = 0  # no links; pragma: no mutate (any empty range does)
     robot.on_air, robot.to = DATA, packet.to
+    robot.rate = params.data_rate if packet.to != BROADCAST else params.broadcast_rate
     robot.duration_ns = params.data_duration_ns if packet.to != BROADCAST else 0
     reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns, packet.bits)
 
@@ -142,6 +143,7 @@ def send_ack(params, state, events, r, now_ns):
         return
     _use_current_links(state, r)
     robot.on_air, robot.to, robot.duration_ns = ACKNOWLEDGEMENT, robot.ack_to, 0
+    robot.rate = params.ack_rate
     reception.start_frame(params, state, events, r, now_ns, params.ack_airtime_ns, params.ack_bits)
 
 

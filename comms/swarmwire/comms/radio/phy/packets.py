@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import AnyArray, IntArray, Table
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_PACKET, NO_ROBOT, NO_TX_STATUS, NOWHERE, UNDER_WAY
-from swarmwire.comms.radio.config.frames import airtime_ns
+from swarmwire.comms.radio.config.frames import airtime_ns, broadcast_airtime_ns
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.links import fill_remainder
 from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET
@@ -105,6 +105,7 @@ class Frames(NamedTuple):
     headers_bytes: int
     bits: IntArray
     airtime_ns: IntArray
+    broadcast_ns: IntArray  # airtime of broadcasts
     ifs_ns: IntArray  # interframe space after the frame
 
 
@@ -114,7 +115,7 @@ def frames_of(radio: Radio) -> Frames:
     ifs_ns = np.zeros(len(sizes), np.int64)
     if radio.access_or_default.method == "csma-802154":
         ifs_ns = IEEE_802_15_4.ifs_ns(sizes - HEADER_BYTES)
-    return Frames(headers_bytes, 8 * sizes, airtime_ns(radio, sizes), ifs_ns)
+    return Frames(headers_bytes, 8 * sizes, airtime_ns(radio, sizes), broadcast_airtime_ns(radio, sizes), ifs_ns)
 
 
 @njit()
@@ -141,7 +142,8 @@ def _accept(
         row.sent_at_ns = row.on_air_at_ns = admitted.sent_at_ns
         row.fate = UNDER_WAY
         if size < len(frames.bits):
-            row.bits, row.airtime_ns, row.ifs_ns = frames.bits[size], frames.airtime_ns[size], frames.ifs_ns[size]
+            row.bits, row.ifs_ns = frames.bits[size], frames.ifs_ns[size]
+            row.airtime_ns = frames.broadcast_ns[size] if to == BROADCAST else frames.airtime_ns[size]
             row.is_too_large, row.result = False, NO_ACKNOWLEDGEMENT
         else:
             row.is_too_large, row.result = True, TX_TOO_LARGE

@@ -10,6 +10,8 @@ from swarmwire.comms.radio.config.frames import (
     acknowledgement_bytes,
     acknowledgement_ns,
     acknowledgement_rate_bps,
+    broadcast_rate_bps,
+    dcf_of,
     eifs_acknowledgement_ns,
 )
 from swarmwire.comms.radio.config.phy import METHODS
@@ -19,11 +21,10 @@ from swarmwire.comms.radio.phy.propagation import cut_off_dbm, receiver_for, sen
 from swarmwire.comms.radio.phy.reception import log_success_table
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sinr_for_db
-from swarmwire.comms.radio.timing import IEEE_802_11A, IEEE_802_11B, IEEE_802_11G, IEEE_802_15_4
+from swarmwire.comms.radio.timing import IEEE_802_15_4
 
 CERTAIN = 1.0 - 1e-12
 FOREVER_NS = 2**62
-DCF_TIMING = {"802.11a": IEEE_802_11A, "802.11b": IEEE_802_11B, "802.11g": IEEE_802_11G}
 
 
 class PhyParams(NamedTuple):
@@ -63,14 +64,17 @@ class PhyParams(NamedTuple):
     cw_min: int
     cw_max: int
     receiver: Receiver
-    log_success: FloatArray  # table of `log_success_table`
-    ack_log_success: FloatArray  # the same table at the bit rate of acknowledgements
+    log_success: FloatArray  # tables of `log_success_table`, (bit rates, rows)
+    # Rows in it.
+    data_rate: int
+    broadcast_rate: int
+    ack_rate: int
 
 
 def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     """Return the PHY parameters of a radio; each arena has `robots` robots."""
     reception, access, receiver = radio.reception_or_default, radio.access_or_default, receiver_for(radio)
-    csma, dcf = IEEE_802_15_4, DCF_TIMING.get(radio.frame, IEEE_802_11B)
+    csma, dcf = IEEE_802_15_4, dcf_of(radio)
     is_dcf = access.method == "dcf"
     cca_threshold_dbm = access.cca_threshold_dbm
     if cca_threshold_dbm is None:
@@ -88,6 +92,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     dcf_timeout_ns = sifs_ns + ack_ns + dcf.slot_ns
     # The standard's value at its bit rate; longer where an acknowledgement at a lower bit rate takes longer.
     csma_timeout_ns = max(csma.ack_wait_ns, sifs_ns + ack_ns + csma.backoff_ns)
+    rates_bps = radio.bit_rate_bps, broadcast_rate_bps(radio), acknowledgement_rate_bps(radio)
     max_bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
     return PhyParams(
         robots=robots,
@@ -121,8 +126,10 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         cw_min=dcf.cw_min,
         cw_max=dcf.cw_max,
         receiver=receiver,
-        log_success=log_success_table(receiver),
-        ack_log_success=log_success_table(receiver_of(reception, acknowledgement_rate_bps(radio))),
+        log_success=np.array([log_success_table(receiver_of(reception, rate_bps)) for rate_bps in rates_bps]),
+        data_rate=rates_bps.index(radio.bit_rate_bps),
+        broadcast_rate=rates_bps.index(broadcast_rate_bps(radio)),
+        ack_rate=rates_bps.index(acknowledgement_rate_bps(radio)),
     )
 
 

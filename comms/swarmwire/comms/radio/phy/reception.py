@@ -47,8 +47,9 @@ def log_success_table(receiver: Receiver) -> FloatArray:
 
 
 @kernel()
-def log_success(table, receiver, sinr, bits):
-    """Return the logarithm of the probability of `bits` bits without error at this SINR, a ratio."""
+def log_success(params, rate, sinr, bits):
+    """Return the logarithm of the probability of `bits` bits at this rate without error at this SINR, a ratio."""
+    table, receiver = params.log_success, params.receiver
     if receiver.model == THRESHOLD:
         return 0.0 if chunk_success(receiver, sinr, bits) > 0.0 else bits * LOG_NEVER
     if sinr >= MAX_SINR:
@@ -56,7 +57,7 @@ def log_success(table, receiver, sinr, bits):
     sinr_bits = np.float64(max(sinr, MIN_SINR)).view(np.int64)
     row = (sinr_bits >> _FRACTION_BITS) - _FIRST
     share = (sinr_bits & _FRACTION) * (1.0 / (1 << 44))
-    return bits * (table[row] + share * (table[row + 1] - table[row]))
+    return bits * (table[rate, row] + share * (table[rate, row + 1] - table[rate, row]))
 
 
 @njit()
@@ -100,27 +101,26 @@ def fate_of_frame(params, losses, state, s, i, frame_log_success):
     if u >= 1.0 + frame_log_success and u >= math_compiled.exp(frame_log_success):
         if u < math_compiled.exp(frame_log_success + state.reception[receiver].jam_log):
             return JAMMED
-        alone = math_compiled.exp(alone_log_success(params, state.link[i].power_mw, sender.bits, is_ack))
+        alone = math_compiled.exp(alone_log_success(params, state.link[i].power_mw, sender.bits, sender.rate))
         return COLLIDED if u < alone else TOO_WEAK
     frame = ReceivedFrame(key, s, receiver, a, b, sequence, attempt, is_ack, sender.on_air_ns, losses.trace_ns)
     return frame_fate(losses, frame)
 
 
 @kernel()
-def alone_log_success(params, power_mw, bits, is_ack):
+def alone_log_success(params, power_mw, bits, rate):
     """Return the logarithm of a frame's success probability without interference."""
     if power_mw < params.min_preamble_mw or power_mw < params.min_preamble_sinr * params.noise_mw:
         return bits * LOG_NEVER
     if power_mw >= params.error_free_sinr * params.noise_mw:
         return 0.0
-    table = params.ack_log_success if is_ack else params.log_success
-    return log_success(table, params.receiver, power_mw / params.noise_mw, bits)
+    return log_success(params, rate, power_mw / params.noise_mw, bits)
 
 
 @kernel(from_python=True)
 def lone_delivery(params, mean_dbm, bits):
     """Return the success probability of a lone frame of `bits` bits at this power."""
-    return math_compiled.exp(alone_log_success(params, from_db(mean_dbm), bits, False))
+    return math_compiled.exp(alone_log_success(params, from_db(mean_dbm), bits, params.data_rate))
 
 
 @njit()
@@ -182,7 +182,7 @@ def end_frame(params, losses, state, events, s, now_ns):
     if params.method == WITHOUT_INTERFERENCE:
         for i in range(sender.first_link, sender.weak_link):
             if link[i].frame_fate == RECEIVING:
-                alone = alone_log_success(params, link[i].power_mw, sender.bits, False)
+                alone = alone_log_success(params, link[i].power_mw, sender.bits, sender.rate)
                 link[i].frame_fate = fate_of_frame(params, losses, state, s, i, alone)
         sender.on_air = SILENT
         return
@@ -281,10 +281,9 @@ def end_chunk(params, robot, rx, now_ns):
     if (rx.signal_mw < params.error_free_sinr * noise_mw) & (rx.log_success > LOG_HOPELESS):
         sender = robot[rx.locked_to]
         bits = sender.bits * ((now_ns - rx.since_ns) / sender.airtime_ns)
-        table = params.ack_log_success if sender.on_air == ACKNOWLEDGEMENT else params.log_success
-        chunk = log_success(table, params.receiver, rx.signal_mw / noise_mw, bits)
+        chunk = log_success(params, sender.rate, rx.signal_mw / noise_mw, bits)
         rx.log_success += chunk
         if rx.jam_mw > 0.0:
             sinr = rx.signal_mw / (params.noise_mw + others_mw)
-            rx.jam_log += log_success(table, params.receiver, sinr, bits) - chunk
+            rx.jam_log += log_success(params, sender.rate, sinr, bits) - chunk
     rx.since_ns = now_ns

@@ -42,6 +42,7 @@ ROBOT = record_type(
         ("on_air_ns", _I),
         ("airtime_ns", _I),
         ("bits", _I),
+        ("rate", _I),  # row of its bit rate in `PhyParams.log_success`
         ("to", _I),  # robot row, BROADCAST or NOWHERE
         ("duration_ns", _I),  # DCF: field Duration of the header, time reserved after the frame
         ("first_link", _I),  # first strong link: fates of strong links are recorded

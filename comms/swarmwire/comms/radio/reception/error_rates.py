@@ -1,6 +1,6 @@
 """Error rates of modulations: from SINR to the probability that a number of bits is received without error.
 
-Bit errors are independent and equally likely. IEEE 802.15.4 (O-QPSK), 802.11b (DSSS, CCK), 802.11a/g (OFDM), Gazebo's
+Bit errors are independent and equally likely. IEEE 802.15.4 (O-QPSK), 802.11b (DSSS, CCK), 802.11a/g/n (OFDM), Gazebo's
 RFComms, measured tables and thresholds.
 """
 
@@ -13,7 +13,7 @@ from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.radio.propagation.decibels import to_db
-from swarmwire.comms.radio.timing import OFDM_BITS_PER_SYMBOL
+from swarmwire.comms.radio.timing import HT_BITS_PER_SYMBOL, OFDM_BITS_PER_SYMBOL
 
 
 @njit()
@@ -112,7 +112,7 @@ def dsss_success(rate: int, sinr: float, bits: Any):
     return all_right(biorthogonal_errors(signal), 0.25 * bits)
 
 
-# IEEE 802.11a/g: OFDM at 6 to 54 Mbit/s in 20 MHz, with the convolutional code K = 7, generators 133 and 171.
+# IEEE 802.11a/g/n: OFDM at 6 to 65 Mbit/s in 20 MHz, with the convolutional code K = 7, generators 133 and 171.
 #
 # Soft decisions: the union bound over the code's paths that leave the correct path, with the probabilities of
 # bit-interleaved coded modulation. Hard decisions, the NIST model, which is ns-3's default up to 3.32 (G. Pei and T. R.
@@ -121,18 +121,23 @@ def dsss_success(rate: int, sinr: float, bits: Any):
 
 
 OFDM_RATES_BPS = tuple(OFDM_BITS_PER_SYMBOL)
-# Points of the constellation and index in SPECTRA, for each rate.
-_POINTS = (2, 2, 4, 4, 16, 16, 64, 64)
-_CODE = (0, 2, 0, 2, 0, 2, 1, 2)
-# Rates 1/2, 2/3 and 3/4: first exponent of D, its step, the factor before the sum, and the coefficients.
+# Points of the constellation and index in SPECTRA, for each rate, and for MCS 7.
+_POINTS = (2, 2, 4, 4, 16, 16, 64, 64, 64)
+_CODE = (0, 2, 0, 2, 0, 2, 1, 2, 3)
+# An MCS has modulation and code of a rate of 802.11a, except for MCS 7 (802.11n-2009: 20.6).
+MODULATIONS = {rate_bps: index for index, rate_bps in enumerate(OFDM_RATES_BPS)} | dict(
+    zip(HT_BITS_PER_SYMBOL, (0, 2, 3, 4, 5, 6, 7, 8), strict=True)
+)
+# Rates 1/2, 2/3, 3/4 and 5/6: first exponent of D, its step, the factor before the sum, and the coefficients.
 SPECTRA = (
     (10, 2, 1 / 2, (36, 211, 1404, 11633, 77433, 502690, 3322763, 21292910, 134365911)),
     (6, 1, 1 / 4, (3, 70, 285, 1276, 6160, 27128, 117019, 498860, 2103891, 8784123)),
     (5, 1, 1 / 6, (42, 201, 1492, 10469, 62935, 379644, 2253373, 13073811, 75152755, 428005675)),
+    (4, 1, 1 / 10, (92, 528, 8694, 79453, 792114, 7375573, 67884974, 610875423, 5427275376, 47664215639)),
 )
 _FIRST = tuple(spectrum[0] for spectrum in SPECTRA)
 _STEP = tuple(spectrum[1] for spectrum in SPECTRA)
-_COEFFICIENTS = np.zeros((3, 10))
+_COEFFICIENTS = np.zeros((4, 10))
 for _code, (_, _, _factor, _weights) in enumerate(SPECTRA):
     _COEFFICIENTS[_code, : len(_weights)] = np.multiply(_factor, _weights)
 # Bits in a period, and paths by weight from the first exponent on: D. Haccoun and G. Begin, IEEE Trans. Comm. 37, 1989.
@@ -140,8 +145,9 @@ PATHS = (
     (1, (11, 38, 193, 1331, 7275, 40406, 234969, 1337714)),
     (2, (1, 16, 48, 158, 642, 2435, 9174, 34701, 131533, 499312)),
     (3, (8, 31, 160, 892, 4512, 23297, 120976, 624304, 3229885, 16721329)),
+    (5, (14, 69, 654, 4996, 39677, 314973, 2503576, 19875546, 157824160, 1253169928)),
 )
-_PATHS = np.zeros((3, 10))
+_PATHS = np.zeros((4, 10))
 for _code, (_bits, _paths) in enumerate(PATHS):
     _PATHS[_code, : len(_paths)] = np.divide(_paths, _bits)
 
@@ -176,7 +182,7 @@ def bit_affinity(points: Any, sinr: Any):
 
 @njit()
 def ofdm_path_errors(rate: int, sinr: float):
-    """Return an upper bound of the decoder's probability per bit to leave the correct path, at OFDM_RATES_BPS[rate].
+    """Return an upper bound of the decoder's probability per bit to leave the correct path; `rate` of MODULATIONS.
 
     1 / k sum a_d Q(sqrt(-2 d ln B)): a_d paths of weight d, k bits in a period of the punctured code, B the
     `bit_affinity` (A. Martinez, A. Guillen i Fabregas, G. Caire, IEEE Trans. Inf. Theory 52, 2006); at most 1.
@@ -197,7 +203,7 @@ def ofdm_success(rate: int, sinr: float, bits: Any):
 
 @njit()
 def nist_bit_errors(rate: int, sinr: float):
-    """Return an upper bound of the bit error rate after decoding, at OFDM_RATES_BPS[rate]; at most 1.
+    """Return an upper bound of the bit error rate after decoding; `rate` of MODULATIONS; at most 1.
 
     The sum of coefficient x D^exponent, with D = sqrt(4 p (1 - p)) and p the bit error rate before decoding.
     """

@@ -13,7 +13,7 @@ from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.radio.config.phy import Reception, SuccessTable
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.error_rates import (
-    OFDM_RATES_BPS,
+    MODULATIONS,
     dsss_success,
     gazebo_success,
     nist_success,
@@ -32,8 +32,8 @@ class Model(IntEnum):
     TABLE = 1  # measured
     OQPSK = 2  # IEEE 802.15.4, 2.4 GHz
     DSSS = 3  # IEEE 802.11b
-    OFDM = 4  # IEEE 802.11a/g, soft decisions
-    NIST = 5  # IEEE 802.11a/g, hard decisions
+    OFDM = 4  # IEEE 802.11a/g/n, soft decisions
+    NIST = 5  # IEEE 802.11a/g/n, hard decisions
     GAZEBO = 6  # gz-sim's RFComms
 
 
@@ -41,7 +41,7 @@ class Receiver(NamedTuple):
     """An error model with its parameters, an input of kernels; the functions below create it."""
 
     model: int
-    rate: int  # index among the rates of DSSS or OFDM
+    rate: int  # index among the rates of DSSS, or in MODULATIONS
     min_sinr: float  # THRESHOLD only; a ratio
     frame_bits: float  # TABLE only
     sinr_db: FloatArray  # TABLE only; (rows,)
@@ -77,8 +77,8 @@ def ieee80211b(rate_bps: int) -> Receiver:
 
 
 def ieee80211ag(rate_bps: int, model: Model = Model.OFDM) -> Receiver:
-    """Return a receiver of IEEE 802.11a or g at one of OFDM_RATES_BPS, with OFDM or NIST; ValueError at other rates."""
-    return Receiver(int(model), OFDM_RATES_BPS.index(rate_bps), 0.0, 0.0, _NO_ROWS, _NO_ROWS)
+    """Return a receiver of IEEE 802.11a/g/n at a rate of MODULATIONS, with OFDM or NIST; KeyError at other rates."""
+    return Receiver(int(model), MODULATIONS[rate_bps], 0.0, 0.0, _NO_ROWS, _NO_ROWS)
 
 
 def gazebo() -> Receiver:
