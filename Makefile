@@ -19,15 +19,25 @@ help: ## list the commands
 
 .PHONY: demo
 demo: ## fly a flock over a lossy radio, a process per robot, and record it under runs/ with a picture
-	@.ci/sync --no-dev
+	@.ci/sync --extra view
 	@run=runs/demo-$$(date -u +%Y%m%dT%H%M%SZ) && set -x && \
 		$(RUN) swarmwire run scenarios/flocking-lossy.toml --set duration_s=60 --runners per-robot --out $$run && \
 		$(RUN) swarmwire export $$run && { set +x; } 2>/dev/null && \
 		echo "see the picture: file://$$PWD/$$run/picture.png"
 
+.PHONY: install
+install: ## put `swarmwire` and `swarmwire-agent` on your PATH; EXTRAS=tune,ui adds what needs more packages
+	@.ci/install "$(EXTRAS)"
+
+.PHONY: wheels
+wheels: ## build the wheels of all parts into wheels/, for projects and machines without this clone
+	@rm -rf wheels
+	@$(UV) build --quiet --all-packages --wheel --out-dir wheels
+	@ls wheels/*.whl
+
 .PHONY: test
 test: ## lint, all unit tests, and the main uses from end to end: what to run first
-	@.ci/sync --no-dev --group test
+	@.ci/sync --group test
 	$(RUN) ruff check --quiet
 	$(PYTEST) tests/unit tests/integration/test_smoke.py
 
@@ -65,7 +75,7 @@ bench: sync ## measure; ONLY=name for one of them, ENGINE=pymunk for the figures
 
 .PHONY: validation
 validation: ## compare the radio with ns-3, whose wheel this installs, and write docs/dev/validation.md
-	@.ci/sync --group validation
+	@.ci/sync --group dev --group validation
 	$(RUN) python -m benchmarks.ns3 --page docs/dev/validation.md
 
 .PHONY: soak
@@ -75,9 +85,9 @@ soak: sync ## fuzz every input, then random faults, then an hour of a hundred pr
 
 .PHONY: mutants
 mutants: ## change the code in small ways, one by one: does a test notice? ONLY=codec, draws or fates; COUNT=all
-	@.ci/sync --group mutants
+	@.ci/sync --group dev --group mutants
 	@for group in $(or $(ONLY),codec draws fates); do $(RUN) tests/tools/mutants/try.sh $$group || exit 1; done
 
 .PHONY: sync
-sync: # the locked packages
-	@.ci/sync
+sync: # the locked packages, those of the other commands among them
+	@.ci/sync --group dev

@@ -88,7 +88,7 @@ def behaviour_pages() -> Problems:
         page = f"docs/behaviours/{page_of(name)}.md"
         text = _text(page).partition(f"\n## {kind}\n")[2].partition("\n## ")[0]
         pictures = [f"{name}.png", f"{name}-degradation.svg"]
-        named = (f"<!-- reference: behaviour {kind} -->\n", f"uv run swarmwire run scenarios/behaviours/{name}.toml\n")
+        named = (f"<!-- reference: behaviour {kind} -->\n", f"swarmwire run scenarios/behaviours/{name}.toml\n")
         if re.findall(r"^!\[.+\]\((.+)\)$", text, re.MULTILINE) != pictures or not all(part in text for part in named):
             yield f"{page}: expected {', '.join(pictures)} and {' and '.join(map(str.strip, named))}"
         groups = tomllib.loads(_text(f"scenarios/behaviours/{name}.toml"))["robots"].values()

@@ -1,6 +1,6 @@
 """A client of an e-puck2 over Wi-Fi, real or emulated, with Python's own modules alone; docs/epuck2.md explains it.
 
-    uv run swarmwire run scenarios/robots/avoidance-epuck2.toml --gateway epuck2@127.0.0.1:11000
+    swarmwire run scenarios/robots/avoidance-epuck2.toml --gateway epuck2@127.0.0.1:11000
     python examples/epuck2_client.py 127.0.0.1 11000
 
 It drives a curve for two seconds with the front LED on, prints the distance ahead, and saves the last image.

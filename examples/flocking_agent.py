@@ -3,7 +3,7 @@
 Run it with a process per robot, from the project's root:
 
     mine=../examples/flocking_agent.py:MyFlocking
-    uv run swarmwire run scenarios/flocking-lossy.toml --runners per-robot --set robots.flock.agent=$mine
+    swarmwire run scenarios/flocking-lossy.toml --runners per-robot --set robots.flock.agent=$mine
 
 The arithmetic is that of `swarmwire.agent.behaviours:Flocking`, in portable functions, so the swarm moves the same,
 bit for bit.

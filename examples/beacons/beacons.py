@@ -2,7 +2,7 @@
 
 Run it in simulation, from the project's root; `docs/robots.md` runs the same file on emulated robots of four kinds:
 
-    uv run swarmwire run examples/beacons/beacons.toml
+    swarmwire run examples/beacons/beacons.toml
 
 Proximity sensors see what is near, and nothing else: an e-puck2's reach 5 cm. Beacons make robots keep a larger
 distance to one another: each packet brings range and bearing of its sender.

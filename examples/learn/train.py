@@ -3,7 +3,7 @@
     python examples/learn/train.py flocking --loss 0 0.3 0.6 0.9 --out flock.onnx
 
 All robots share one network, and each sees and sets its own numbers (docs/learn.md). Losses are drawn again for each
-episode of each arena. The tutorial docs/tutorial-learn.md explains this file; it needs `pip install torch onnxscript`.
+episode of each arena. The tutorial docs/tutorial-learn.md explains this file; it needs torch and onnxscript.
 
 Source: J. Schulman et al., Proximal Policy Optimization Algorithms, arXiv:1707.06347 (2017).
 """

@@ -1,4 +1,4 @@
-"""A behaviour tree, by py_trees (`pip install "swarmwire[trees]"`): conditions and actions, put together as a tree.
+"""A behaviour tree, by py_trees (the extra `trees`): conditions and actions, put together as a tree.
 
 Right for many small behaviours that are combined and reused. A selector ticks its children in turn until one succeeds,
 a sequence until one fails; the tree of an agent is ticked once a step.

@@ -14,7 +14,6 @@ import pytest
 
 from swarmwire.deploy import run
 from tests.docs.pages import ROOT, commands_of
-from tests.docs.test_pages import UV
 from tests.support.deploy.machines import Machine, Started, machines
 from tests.support.deploy.runs import LOSSY, called
 
@@ -44,17 +43,14 @@ def typed_in(text: str) -> list[Typed]:
 
 
 def shell(line: str, folder: Path) -> list[str]:
-    """The command of a line, in a machine's folder, whose `uv run` is the tests' own environment."""
-    path = os.pathsep.join([str(folder / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]])
+    """The command of a line, in a machine's folder, with the programs of the tests' environment."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     return ["env", f"PATH={path}", "sh", "-c", f"cd {folder} && exec {line}"]
 
 
 def new_folder(folder: Path) -> Path:
     """What a machine has: the project's scenarios and programs."""
     shutil.copytree(ROOT / "scenarios", folder / "scenarios")
-    (folder / "bin").mkdir()
-    (folder / "bin" / "uv").write_text(UV)
-    (folder / "bin" / "uv").chmod(0o755)
     return folder
 
 
@@ -95,7 +91,7 @@ def certificates(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
     shutil.copytree(ROOT / "examples" / "fleet", folder / "examples" / "fleet")
     monkeypatch.chdir(folder)
     for command in commands_of(CERTIFICATES):
-        code, _, errors = called(monkeypatch, capsys, *shlex.split(command.line.removeprefix("uv run "))[1:])
+        code, _, errors = called(monkeypatch, capsys, *shlex.split(command.line)[1:])
         assert code == 0, errors
     return folder / "lab-ca"
 

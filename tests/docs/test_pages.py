@@ -16,13 +16,7 @@ from tests.support.deploy.runs import called
 
 WITH_COMMANDS = [page for page in PAGES if commands_of(page)]
 SHOWN = ("docs/getting-started.md", "docs/scenario.md", "docs/api/deploy.md")
-IN_THIS_PROCESS = re.compile(r"(?:uv run )?swarmwire (?!sweep|tune)[^|&;>*]*")  # workers need a main module
-UV = """#!/bin/sh
-# What `uv run` comes to here: the environment is that of the tests.
-test "$1" = run || exit 64
-shift
-exec "$@"
-"""
+IN_THIS_PROCESS = re.compile(r"swarmwire (?!sweep|tune|test)[^|&;>*]*")  # workers need a main module
 
 
 @pytest.fixture
@@ -30,11 +24,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working directory, which holds what a user of the project finds there."""
     for folder in ("scenarios", "examples"):
         shutil.copytree(ROOT / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
-    (tmp_path / "bin").mkdir()
-    (tmp_path / "bin" / "uv").write_text(UV)
-    (tmp_path / "bin" / "uv").chmod(0o755)
-    path = os.pathsep.join([str(tmp_path / "bin"), str(Path(sys.executable).parent), os.environ["PATH"]])
-    monkeypatch.setenv("PATH", path)
+    monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -54,7 +44,7 @@ def test_commands_run_and_print_what_is_shown(page, project, monkeypatch, capsys
         (project / name).write_text(text)
     for command in commands_of(page):
         if IN_THIS_PROCESS.fullmatch(command.line):
-            words = shlex.split(command.line.removeprefix("uv run "))[1:]
+            words = shlex.split(command.line)[1:]
             code, *printed = called(monkeypatch, capsys, *words)
         else:
             code, *printed = in_a_shell(command.line)

@@ -30,16 +30,18 @@ from tests.support.clocks import until
 
 PAGE = "docs/robots.md"
 TRIED = re.compile(r"^<!-- try: (\w+) -->\n```text\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
-OURS = re.compile(r"^(?:.*\| xargs .*)?uv run (swarmwire(?:-agent)?) (.*)$")
+OURS = re.compile(r"^(?:.*\| xargs .*)?\b(swarmwire(?:-agent)?) (.*)$")
 ROBOTS = ("flock-0", "flock-1")
 
 
 @contextmanager
 def terminal(line: str) -> Generator[subprocess.Popen[str]]:
     """A shell that is given a line of the page, and Ctrl-C at the end."""
-    here = line.replace("uv run ", f"{Path(sys.executable).parent}/")
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
-    with subprocess.Popen(["bash", "-c", here], start_new_session=True, **pipes) as process:
+    with subprocess.Popen(
+        ["bash", "-c", line], start_new_session=True, env={**os.environ, "PATH": path}, **pipes
+    ) as process:
         try:
             yield process
         finally:

@@ -60,6 +60,10 @@ keep_kernels()
 
 def __getattr__(name: str) -> Any:
     """Import a name on first use, so that `swarmwire --help` does not wait for compilers, physics and zenoh."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("swarmwire-deploy")
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_MODULES.get(name, "swarmwire.deploy.runs.result")), name)

@@ -168,9 +168,11 @@ def refusal(error: BaseException) -> str | None:
 
 
 def command_path(name: str = "swarmwire") -> Path:
-    """Return the path of a program of swarmwire as users can type it; with `uv run` it is not on their path."""
+    """Return a program of swarmwire as users can type it: its name, or its path if their PATH does not lead to it."""
     present = Path(sys.argv[0])
     path = present.with_name(name)
     if present.name != "swarmwire" or not path.exists():  # started by python -m or another program
+        return Path(name)
+    if (on_path := shutil.which(name)) and Path(on_path).samefile(path):
         return Path(name)
     return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

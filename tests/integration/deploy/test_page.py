@@ -77,10 +77,10 @@ def test_run_with_a_page_begins_paused_at_the_speed_of_the_wall_clock(tmp_path, 
 
 def test_without_the_extra_it_is_named_and_no_folder_is_made(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
-    with pytest.raises(BadInput, match=r'ui: needs fastapi and uvicorn: pip install "swarmwire\[ui\]"'):
+    with pytest.raises(BadInput, match=r"ui: needs fastapi and uvicorn: install swarmwire\[ui\]"):
         UI.need("ui")
     code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--ui", "--out", tmp_path / "run")
-    assert (code, errors) == (2, 'error: --ui: needs fastapi and uvicorn: pip install "swarmwire[ui]"\n')
+    assert (code, errors) == (2, "error: --ui: needs fastapi and uvicorn: install swarmwire[ui]\n")
     assert not (tmp_path / "run").exists()
 
 

@@ -223,7 +223,7 @@ def test_setting_that_cannot_be_used_is_refused(key, settings):
 
 def test_source_without_rosbags_names_the_pip_command(monkeypatch):
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
-    with pytest.raises(BadInput, match=r'pip install "swarmwire-agent\[ros2\]"'):
+    with pytest.raises(BadInput, match=r"install swarmwire-agent\[ros2\]"):
         source_of().open()
 
 

@@ -13,7 +13,7 @@ if [ ! -e "$root/usr/bin/python3.11" ]; then
     for package in "$root"/var/cache/apt/archives/*.deb; do dpkg -x "$package" "$root"; done
 fi
 if [ ! -d "$site/numpy" ]; then
-    .ci/uv export --quiet --no-dev --no-emit-workspace --no-hashes >"$folder/requirements.txt"
+    .ci/uv export --quiet --no-emit-workspace --no-hashes >"$folder/requirements.txt"
     .ci/uv pip install --no-deps --only-binary :all: --python-version 3.11 --python-platform aarch64-manylinux_2_28 \
         --target "$site" -r "$folder/requirements.txt"
 fi

@@ -178,13 +178,15 @@ def test_command_line_prints_machine_limits_and_raises_mistakes(monkeypatch, cap
         ("bin/swarmwire", "swarmwire-agent", "{root}/bin/swarmwire-agent"),
         ("here/bin/swarmwire", "other", "other"),
         ("here/mine.py", "swarmwire-agent", "swarmwire-agent"),
+        ("path/swarmwire", "swarmwire-agent", "swarmwire-agent"),
     ],
-    ids=["below the folder", "elsewhere", "not beside it", "from a program of others"],
+    ids=["below the folder", "elsewhere", "not beside it", "from a program of others", "on PATH"],
 )
 def test_program_name_as_printed_can_be_typed(tmp_path, monkeypatch, called, name, typed):
-    for folder in ("bin", "here/bin"):
+    for folder in ("bin", "here/bin", "path"):
         (tmp_path / folder).mkdir(parents=True)
-        (tmp_path / folder / "swarmwire-agent").touch()
+        (tmp_path / folder / "swarmwire-agent").touch(mode=0o755)
     monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.setenv("PATH", str(tmp_path / "path"))
     monkeypatch.setattr(sys, "argv", [str(tmp_path / called)])
     assert str(command_path(name)) == typed.format(root=tmp_path)

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import Extra
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -88,7 +89,7 @@ def _remedy(point: "EntryPoint", error: ImportError) -> str:
     is_class_module = f"{point.module}.".startswith(f"{missing}.")  # no extra installs the class's module
     if not missing or is_class_module or point.name not in extras:
         return ""
-    return f": pip install '{_package(point)}[{point.name}]'"
+    return f": {Extra(f'{_package(point)}[{point.name}]', ()).remedy()}"
 
 
 def file_of(spec: str) -> str:

@@ -30,6 +30,11 @@ COMMANDS = {
         "run:run_command",
         "Run a scenario, show its progress, and write a run folder: summary, tables, recording, log.",
     ),
+    "test": CommandEntry(
+        RUN,
+        "inspect:run_tests_command",
+        "Run the tests of a swarm by pytest, in swarmwire's own environment.",
+    ),
     "repeat": CommandEntry(
         RUN,
         "run:repeat_command",

@@ -1,4 +1,4 @@
-"""The commands `new`, `import`, `check`, `list`, `describe`, `schema` and `verify`."""
+"""The commands `new`, `test`, `import`, `check`, `list`, `describe`, `schema` and `verify`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -75,10 +75,11 @@ def schema_command() -> None:
 
 
 def new_command(
-    name: Annotated[
-        str,
+    folder: Annotated[
+        Path,
         typer.Argument(
-            help="The new folder, in the current one: small letters, digits and _, such as my_swarm.", metavar="NAME"
+            help="The new folder, such as my_swarm or ../my_swarm; its name is small letters, digits and _.",
+            metavar="FOLDER",
         ),
     ],
 ) -> None:
@@ -89,10 +90,29 @@ def new_command(
       swarmwire new my_swarm
 
       swarmwire run my_swarm
+
+      swarmwire test my_swarm
     """
     from swarmwire.deploy.cli.actions.new import create_swarm
 
-    create_swarm(name)
+    create_swarm(folder)
+
+
+def run_tests_command(
+    folder: Annotated[Path, typer.Argument(help="A folder with tests, or a file.", metavar="FOLDER")] = Path(),
+    words: Annotated[list[str] | None, typer.Argument(help="Arguments of pytest.", metavar="-- [WORDS]...")] = None,
+) -> None:
+    """Run the tests of a swarm by pytest, in swarmwire's own environment.
+
+    For example:
+
+      swarmwire test my_swarm
+
+      swarmwire test my_swarm -- -x -k received
+    """
+    from swarmwire.deploy.cli.actions.new import run_tests
+
+    run_tests(folder, words or [])
 
 
 def import_command(

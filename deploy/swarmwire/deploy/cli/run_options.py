@@ -87,7 +87,7 @@ class PacketOptions:
 class RecordingOptions(PacketOptions):
     """Recording of packets, links and pictures."""
 
-    rrd: Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer.")] = True
+    rrd: Annotated[bool, typer.Option(help="Record run.rrd, for rerun's viewer, if it is installed.")] = True
     select: Annotated[
         str | None,
         typer.Option(help="Robot that the views show in detail. Default: the first with rays.", metavar="ROBOT"),

@@ -137,7 +137,7 @@ def pins(drivers: Iterable[str], packages: Iterable[str], platform: RobotPlatfor
         try:
             installed = distribution(need.name)
         except PackageNotFoundError:
-            raise BadInput("packages", need.name, f"is not installed here: pip install {need.name}") from None
+            raise BadInput("packages", need.name, "is not installed here; install it") from None
         name = canonicalize_name(need.name)
         if name not in SWARMWIRE:
             pin_of[name] = Pin(name, installed.version)

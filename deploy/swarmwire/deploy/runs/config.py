@@ -42,7 +42,7 @@ class Recording:
     packets: float = 0.0  #: share of the packets in `packets.parquet`, drawn by key; 1: all
     links: bool = False  #: `radio_links.parquet`
     tables: bool = True  #: `ticks.parquet`, `events.parquet`, `radio_robots.parquet`, `radio_distances.parquet`
-    rrd: bool = True  #: `run.rrd`, for rerun's viewer
+    rrd: bool = True  #: `run.rrd`, for rerun's viewer, where the extra `view` is installed
     select: str | None = None  #: robot that views show in detail; None: the first that has rays or photocells
 
     def __post_init__(self) -> None:

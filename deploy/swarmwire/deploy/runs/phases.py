@@ -9,6 +9,7 @@ from typing import cast
 
 from swarmwire.comms.base.clock import PreciseClock, ScaledClock, WallClock, to_ns
 from swarmwire.comms.base.ethernet import FRAME_TAG
+from swarmwire.comms.base.extras import VIEW
 from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
 from swarmwire.comms.robot.messages import DICT_TAG, RELAY_TAG, message_classes
 from swarmwire.comms.robot.tick_io import SparseTable
@@ -276,7 +277,7 @@ class PreparedRun:
                 folder, metrics, clock, record.packets, topics, links=record.links, may_drop=may_drop
             )
             observers += recorders(options)
-        if record.rrd:
+        if record.rrd and not VIEW.missing():
             observers.append(RerunRecording(folder / RECORDING, metrics, clock, selected=record.select))
         return observers
 

@@ -143,7 +143,7 @@ def test_invalid_ros_name_is_refused(name):
 
 def test_missing_rosbags_names_the_pip_command(monkeypatch):
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
-    with pytest.raises(BadInput, match=r'pip install "swarmwire-agent\[ros2\]"'):
+    with pytest.raises(BadInput, match=r"install swarmwire-agent\[ros2\]"):
         Messages("jazzy")
 
 

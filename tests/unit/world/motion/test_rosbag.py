@@ -212,5 +212,5 @@ def test_missing_rosbag_and_missing_rosbags_are_refused(tmp_path: Path, monkeypa
     with refused_input(tmp_path / "a.mcap", "", "intact bag"):
         read_trace(tmp_path / "a.mcap")
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
-    with refused_input(tmp_path / "a.mcap", "", r'pip install "swarmwire-agent\[ros2\]"'):
+    with refused_input(tmp_path / "a.mcap", "", r"install swarmwire-agent\[ros2\]"):
         read_trace(tmp_path / "a.mcap")

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from swarmwire.comms.base.config import from_toml
 from swarmwire.comms.base.errors import BadInput, RecordFailed
-from swarmwire.comms.base.extras import UI
+from swarmwire.comms.base.extras import UI, VIEW
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.wire.access_control import TRACKER
 from swarmwire.comms.wire.network import Network, as_options
@@ -32,6 +32,7 @@ from swarmwire.deploy.runs.record.folder import default_folder
 from swarmwire.deploy.runs.result import Result
 from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.deploy.terminal.console import TerminalConsole
+from swarmwire.metrics.records.run_folder.layout import RECORDING
 from swarmwire.world.placement.maps import layout_hints
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
@@ -115,9 +116,12 @@ def _finish(simulation: Simulation, console: Console) -> Result:
 
 
 def _print_next_steps(result: Result, folder: Path, console: Console) -> None:
-    recorded = f" (the pictures of seed {result.arenas[0].seed})" if len(result.arenas) > 1 else ""
-    console.print(f"written: {folder}{recorded}", soft_wrap=True)
-    console.print(f"look at it: {command_path()} view {folder}", soft_wrap=True)
+    pictured = f" (the pictures of seed {result.arenas[0].seed})" if len(result.arenas) > 1 else ""
+    console.print(f"written: {folder}{pictured}", soft_wrap=True)
+    recorded = (folder / RECORDING).exists()
+    console.print(f"look at it: {command_path()} {'view' if recorded else 'export'} {folder}", soft_wrap=True)
+    if VIEW.missing():
+        console.print(f"no run.rrd for the viewer, which needs rerun: {VIEW.remedy()}", soft_wrap=True)
     console.print(f"as a film: {command_path()} export {folder} --to film.gif", soft_wrap=True)
 
 

@@ -13,7 +13,7 @@ from typing import IO, Any, cast
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, ByteArray, IntArray
-from swarmwire.comms.base.extras import REPORT
+from swarmwire.comms.base.extras import FILM, REPORT
 from swarmwire.metrics.measures.torus import unwrap_path
 from swarmwire.metrics.pictures.drawing.canvas import (
     INK,
@@ -241,9 +241,9 @@ def _indexed(frames: Iterable[ByteArray], palette: Any) -> Iterator[Any]:
 def write_mp4(to: Path, frames: Iterable[ByteArray], frames_per_s: float) -> None:
     """Write frames (height, width, 3), with even sides, as a film.
 
-    BadInput without the extra [report]. OSError if ffmpeg fails, for example on a full disk.
+    BadInput without the extra [film]. OSError if ffmpeg fails, for example on a full disk.
     """
-    REPORT.need("films")
+    FILM.need("films as .mp4")
     from imageio_ffmpeg import get_ffmpeg_exe  # its own writer does not report failures of ffmpeg
 
     frames = iter(frames)
