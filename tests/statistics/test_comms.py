@@ -8,7 +8,8 @@ import pytest
 
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.radio.analysis.contention import contention
-from swarmwire.comms.radio.config.phy import Antenna, Fading, ReceiverNoise, Reception, Shadowing
+from swarmwire.comms.radio.config.antennas import Antenna
+from swarmwire.comms.radio.config.phy import Fading, ReceiverNoise, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model
 from swarmwire.comms.robot.packets import Fate

@@ -4,6 +4,7 @@ import sys
 
 from docs.pictures.radio import (
     access,
+    antennas,
     bursts,
     capture,
     delays,
@@ -16,6 +17,7 @@ from docs.pictures.radio import (
 
 FIGURES = {
     "path-loss": path_loss.draw,
+    "antennas": antennas.draw,
     "shadowing": shadowing.draw,
     "walls": walls.draw,
     "fading": fading.draw,

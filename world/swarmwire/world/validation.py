@@ -12,6 +12,7 @@ from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.ros2.keys import RADIO_TOPICS, check_name
 from swarmwire.comms.protocols.ros2.relay import PART
+from swarmwire.comms.radio.config.antennas import check_pattern
 from swarmwire.comms.radio.config.radio import Radio, check_radio, unfit_for_torus
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.world.actuation.actuators import noise_of
@@ -88,6 +89,8 @@ def _check_antennas(scenario: Scenario, where: str) -> None:
         if table.radio is not None and (scenario.radio is None or not scenario.radio.is_phy):
             reason = "a disk knows no strength" if scenario.radio else "there is no [radio]"
             raise BadInput(where, f"robots.{group}.radio", f"expected a radio with a PHY: {reason}")
+        if table.radio is not None:
+            check_pattern(table.radio.pattern, where, f"robots.{group}.radio.pattern")
 
 
 def _check_motion(scenario: Scenario, where: str) -> None:

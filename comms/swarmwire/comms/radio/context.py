@@ -8,7 +8,7 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, KeyArray
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import Obstacles, obstacle_arrays
 from swarmwire.comms.base.threads import Threads
-from swarmwire.comms.radio.config.phy import Antennas
+from swarmwire.comms.radio.config.antennas import Antennas
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import ActiveDisruption
 from swarmwire.comms.radio.traces import LinkTraces

@@ -17,7 +17,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.plugins import resolve
 from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.base.threads import Threads
-from swarmwire.comms.radio.config.phy import Antennas
+from swarmwire.comms.radio.config.antennas import Antennas
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext

@@ -5,8 +5,9 @@ them, at most four of them (false alarm 1 in 16 000 each), and those are held to
 import numpy as np
 import pytest
 
+from swarmwire.comms.radio.config.antennas import Antenna
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
-from swarmwire.comms.radio.config.phy import Antenna, Shadowing
+from swarmwire.comms.radio.config.phy import Shadowing
 from swarmwire.deploy.cli.actions.radio_fit import FitRow, parameter_rows, radio_table, residual_rows
 from swarmwire.metrics.real.radio_fit.fit import fit_radio
 from swarmwire.metrics.real.radio_fit.logs import loss_sequences, read_log

@@ -15,9 +15,10 @@ from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.analysis.contention import Contention, contention
 from swarmwire.comms.radio.analysis.coverage import RadioCoverage, by_distance, coverage_map
+from swarmwire.comms.radio.config.antennas import Antenna
 from swarmwire.comms.radio.config.frames import acknowledgement_ns, airtime_ns
 from swarmwire.comms.radio.config.impairments import Bursts
-from swarmwire.comms.radio.config.phy import Access, Antenna, Fading, Shadowing, Walls
+from swarmwire.comms.radio.config.phy import Access, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, range_of, receiver_for, sensitivity_of

@@ -9,8 +9,9 @@ import pytest
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.radio.config.antennas import Antenna, Antennas, RobotAntenna
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
-from swarmwire.comms.radio.config.phy import Antenna, Antennas, Fading, ReceiverNoise, RobotAntenna, Shadowing
+from swarmwire.comms.radio.config.phy import Fading, ReceiverNoise, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import check_number, number_of, numbers_of
 from swarmwire.comms.radio.context import ChannelContext

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from swarmwire.comms.radio.config.antennas import RobotAntenna
 from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
-from swarmwire.comms.radio.config.phy import RobotAntenna
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.bodies.body import load_body

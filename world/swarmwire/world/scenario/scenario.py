@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, cast
 from pydantic import BaseModel, Field, PrivateAttr, StringConstraints, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from swarmwire.comms.radio.config.phy import RobotAntenna
+from swarmwire.comms.radio.config.antennas import RobotAntenna
 from swarmwire.comms.radio.config.presets import with_preset
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.world.events import ACTIONS
@@ -71,7 +71,7 @@ class RobotsTable(ScenarioTable):
     params: dict[str, Any] = Field(default_factory=dict)
     """The agent's parameters."""
     radio: Annotated[RobotAntenna, AsTable()] | None = None
-    """Power and gain of the group's radios; only for a radio with a PHY."""
+    """Power, gain and pattern of the group's antennas; only for a radio with a PHY."""
     place: PlacementTable = InArena(how="arena")
     """Poses of the robots at the start."""
     motion: MotionTable | None = None

@@ -1,6 +1,7 @@
 """Coverage of a radio: mean power and delivery of lone packets between two points, as a map or by distance.
 
-Propagation and reception are those of the medium, without other robots; all points are on the floor.
+Propagation and reception are those of the medium, without other robots; all points are on the floor. A point may have
+a heading, with which its antenna turns; the antenna of a point without a heading points at the other end of the link.
 """
 
 # pyright: basic, reportUnknownMemberType=false
@@ -17,12 +18,14 @@ from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.kernels import njit
+from swarmwire.comms.radio.config.antennas import Antenna
 from swarmwire.comms.radio.config.phy import Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, sensitivity_of
 from swarmwire.comms.radio.phy.reception import lone_deliveries
+from swarmwire.comms.radio.propagation.antennas import add_pattern_losses, antenna_patterns
 from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model
 from swarmwire.comms.radio.propagation.path_loss import MeanLoss, loss_between_db, rssi_dbm
@@ -42,9 +45,20 @@ class RadioCoverage:
         sensitivity_dbm: the least mean power that counts as in range; None for a unit disk.
     """
 
-    def __init__(self, radio: Radio, key: np.uint64, obstacles: ObstacleIndices, payload_bytes: int) -> None:
-        """`key` is the arena's, `obstacles` are those of this arena alone, `payload_bytes` is the size of a packet."""
+    def __init__(
+        self,
+        radio: Radio,
+        key: np.uint64,
+        obstacles: ObstacleIndices,
+        payload_bytes: int,
+        sender: Antenna | None = None,
+    ) -> None:
+        """`key` is the arena's, `obstacles` are those of this arena alone, `payload_bytes` is the size of a packet.
+
+        `sender` is the antenna at the start of links, by default the radio's, which all receivers have.
+        """
         self._radio, self._obstacles = radio, obstacles.now()
+        self._sender, self._receiver = sender or radio.antenna_or_default, radio.antenna_or_default
         self._losses = LossChain.create(_context_of(radio, key, obstacles))
         self._range_m = math.inf if radio.range_m is None else radio.range_m
         self.sensitivity_dbm = sensitivity_of(radio) if radio.is_phy else None
@@ -56,13 +70,32 @@ class RadioCoverage:
             self._by_power = self._delivery_by_power(key, 8 * (payload_bytes + radio.overhead_bytes))
 
     def mean_dbm(self, start: FloatArray, end: FloatArray) -> FloatArray | None:
-        """Return the mean power between points (k, 2) in m, without fading, (k,); None for a unit disk."""
+        """Return the mean power between points (k, 2) in m, without fading, (k,); None for a unit disk.
+
+        Points with a heading in rad are rows (k, 3).
+        """
         if not self._radio.is_phy:
             return None
-        start, end = np.ascontiguousarray(start, np.float64), np.ascontiguousarray(end, np.float64)
-        antenna = self._radio.antenna_or_default
-        loss_db = _mean_loss_db(self._mean_loss, self._waves, self._obstacles, start, end)
-        return rssi_dbm(antenna.power_dbm, antenna.gain_dbi, antenna.gain_dbi, loss_db)
+        start_m, end_m = (np.ascontiguousarray(points[:, :2], np.float64) for points in (start, end))
+        loss_db = _mean_loss_db(self._mean_loss, self._waves, self._obstacles, start_m, end_m)
+        if self.is_directional:
+            self._add_pattern_losses(loss_db, start, end)
+        return rssi_dbm(self._sender.power_dbm, self._sender.peak_dbi, self._receiver.peak_dbi, loss_db)
+
+    @property
+    def is_directional(self) -> bool:
+        """True if the antenna of the sender or of receivers has a pattern."""
+        return self._radio.is_phy and (self._sender.is_directional or self._receiver.is_directional)
+
+    def _add_pattern_losses(self, loss_db: FloatArray, start: FloatArray, end: FloatArray) -> None:
+        """Add the losses of the antennas of points with a heading, in place."""
+        links, turning = len(loss_db), [points.shape[1] > 2 for points in (start, end)]
+        antennas = self._sender if turning[0] else Antenna(), self._receiver if turning[1] else Antenna()
+        patterns = antenna_patterns(antennas, np.repeat([0, 1], links))
+        x, y = np.concatenate([start[:, :2], end[:, :2]]).T
+        heading = np.concatenate([points[:, 2] if points.shape[1] > 2 else np.zeros(links) for points in (start, end)])
+        a, b = np.arange(links), links + np.arange(links)
+        add_pattern_losses(loss_db, patterns, x.copy(), y.copy(), np.zeros(2 * links), heading, a, b)
 
     def in_range(self, start: FloatArray, end: FloatArray) -> BoolArray:
         """Return True for links in range whose mean power reaches the sensitivity and that no obstacle blocks, (k,)."""
@@ -89,6 +122,7 @@ class RadioCoverage:
 
     def _open(self, start: FloatArray, end: FloatArray) -> BoolArray:
         """Return True for links within the radio's range and, if the radio needs it, with a line of sight, (k,)."""
+        start, end = np.ascontiguousarray(start[:, :2]), np.ascontiguousarray(end[:, :2])
         offset = end - start
         within = (offset * offset).sum(axis=1) <= self._range_m * self._range_m
         return within & ~_blocked(self._obstacles, start, end) if self._radio.needs_line_of_sight else within
@@ -182,13 +216,21 @@ class ByDistance:
 
 
 def coverage_map(
-    coverage: RadioCoverage, size_m: tuple[float, float], at_m: tuple[float, float], points: int
+    coverage: RadioCoverage,
+    size_m: tuple[float, float],
+    at_m: tuple[float, float],
+    points: int,
+    heading_rad: float | None = None,
 ) -> CoverageMap:
-    """Return the map from a point, with `points` grid points along the longer side of the arena."""
+    """Return the map from a point, with `points` grid points along the longer side of the arena.
+
+    `heading_rad` is that of the sender, by default towards each point; antennas of receivers point at the sender.
+    """
     step_m = max(size_m) / points
     x_m, y_m = (_cell_centres(side_m, step_m) for side_m in size_m)
     end = np.stack(np.meshgrid(x_m, y_m), axis=-1).reshape(-1, 2)
-    start = np.broadcast_to(np.array(at_m), end.shape)
+    pose = at_m if heading_rad is None else (*at_m, heading_rad)
+    start = np.broadcast_to(np.array(pose), (len(end), len(pose)))
     shape = len(y_m), len(x_m)
     mean_dbm = coverage.mean_dbm(start, end)
     return CoverageMap(
@@ -207,7 +249,8 @@ def by_distance(
 ) -> ByDistance:
     """Return delivery and strength over links between free points of the arena, at distances up to `farthest_m`.
 
-    Links are uniform in position and direction, drawn by the arena's key. Distances with fewer than
+    Links are uniform in position and direction, and antennas with patterns in their headings, drawn by the arena's key.
+    Distances with fewer than
     MIN_LINKS links that fit into the arena are omitted.
     """
     lengths_m = farthest_m * (np.arange(distances) + 0.5) / distances
@@ -234,7 +277,10 @@ def _cell_centres(side_m: float, step_m: float) -> FloatArray:
 def _links(
     coverage: RadioCoverage, size_m: tuple[float, float], key: np.uint64, distance_index: int, distance_m: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return start and end (k, 2) in m of links of this length, within the arena and outside obstacles."""
+    """Return start and end (k, 2) in m of links of this length, within the arena and outside obstacles.
+
+    With directional antennas they have headings, (k, 3).
+    """
     keys = np.array(key, np.uint64)
     x, y, turn = (uniform(keys, np.arange(CANDIDATES), distance_index, axis, SURVEY) for axis in range(3))
     start = (np.stack([x, y], axis=1) - 0.5) * size_m
@@ -242,4 +288,7 @@ def _links(
     end = start + distance_m * direction
     fits = np.flatnonzero((np.abs(end) <= 0.5 * np.array(size_m)).all(axis=1))
     fits = fits[coverage.is_free(start[fits]) & coverage.is_free(end[fits])][:MAX_LINKS]
+    if coverage.is_directional:
+        headings = (2.0 * np.pi * uniform(keys, np.arange(CANDIDATES), distance_index, i, SURVEY) for i in (3, 4))
+        start, end = (np.column_stack([ends, heading]) for ends, heading in zip((start, end), headings, strict=True))
     return start[fits], end[fits]

@@ -1,43 +1,17 @@
-"""Scenario tables of the PHY: antennas, propagation beyond path loss, reception, noise and channel access.
+"""Scenario tables of the PHY: propagation beyond path loss, reception, noise and channel access.
 
 No kernels: a scenario is read without a compiler.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
-
 from swarmwire.comms.base import math as portable
-from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.radio.timing import DSSS_RATES_BPS, HT_BITS_PER_SYMBOL, OFDM_BITS_PER_SYMBOL
 
 FADINGS = ("rayleigh", "rician", "nakagami")
-
-
-@dataclass(frozen=True)
-class Antenna:
-    """Transmit power and antenna gain of a radio, equal in all directions."""
-
-    power_dbm: float = parameter(0.0, help="transmit power into the antenna", unit="dBm", at_least=-100, at_most=100)
-    gain_dbi: float = parameter(
-        0.0, help="gain of the antenna, when sending and when receiving", unit="dBi", at_least=-100, at_most=100
-    )
-
-
-@dataclass(frozen=True)
-class RobotAntenna:
-    """Antennas of a group's robots where they differ from `[radio.antenna]`."""
-
-    power_dbm: float | None = parameter(
-        None, help="transmit power into the antenna", unit="dBm", at_least=-100, at_most=100
-    )
-    gain_dbi: float | None = parameter(
-        None, help="gain of the antenna, when sending and when receiving", unit="dBi", at_least=-100, at_most=100
-    )
 
 
 @dataclass(frozen=True)
@@ -84,40 +58,6 @@ class Fading:
     m: float = parameter(
         1.5, help="nakagami only: 1 is rayleigh, less is worse, more is milder", at_least=0.5, at_most=200
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Antennas:
-    """Antennas of robots by index in the arena; NaN where `[radio.antenna]` applies."""
-
-    power_dbm: FloatArray  # (robots,)
-    gain_dbi: FloatArray  # (robots,)
-
-    @classmethod
-    def of_groups(cls, groups: Iterable[tuple[int, RobotAntenna | None]]) -> "Antennas":
-        """Return the antennas of groups, each with its number of robots, in their order."""
-        antennas = [(count, antenna or RobotAntenna()) for count, antenna in groups]
-        counts = [count for count, _ in antennas]
-        power_dbm = [np.nan if antenna.power_dbm is None else antenna.power_dbm for _, antenna in antennas]
-        gain_dbi = [np.nan if antenna.gain_dbi is None else antenna.gain_dbi for _, antenna in antennas]
-        return cls(np.repeat(power_dbm, counts), np.repeat(gain_dbi, counts))
-
-    @classmethod
-    def alike(cls, robots: int) -> "Antennas":
-        """Return the antennas of robots to all of which `[radio.antenna]` applies."""
-        return cls.of_groups([(robots, None)])
-
-    def send_dbm(self, antenna: Antenna) -> FloatArray:
-        """Radiated power of each robot, antenna gain included, (robots,); `antenna` is the radio's."""
-        return _or(self.power_dbm, antenna.power_dbm) + self.receive_dbi(antenna)
-
-    def receive_dbi(self, antenna: Antenna) -> FloatArray:
-        """Antenna gain of each robot, (robots,); `antenna` is the radio's."""
-        return _or(self.gain_dbi, antenna.gain_dbi)
-
-
-def _or(values: FloatArray, default: float) -> FloatArray:
-    return np.where(np.isnan(values), default, values)
 
 
 RATES_BPS = {

@@ -9,11 +9,11 @@ from ipaddress import IPv4Network
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.ethernet import HEADER_BYTES
+from swarmwire.comms.radio.config.antennas import Antenna, check_pattern
 from swarmwire.comms.radio.config.impairments import Bursts, Delays, Measures, refuse_negative
 from swarmwire.comms.radio.config.path_loss_models import Friis, ItuIndoor, LogDistance, TwoRay
 from swarmwire.comms.radio.config.phy import (
     Access,
-    Antenna,
     Bodies,
     Fading,
     ReceiverNoise,
@@ -142,7 +142,7 @@ class Radio:
     log_distance: LogDistance | None = parameter(None, help="parameters of the model log-distance")
     two_ray: TwoRay | None = parameter(None, help="parameters of the model two-ray")
     itu_indoor: ItuIndoor | None = parameter(None, help="parameters of the model itu-indoor")
-    antenna: Antenna | None = parameter(None, help="PHY only: transmit power and antenna gain")
+    antenna: Antenna | None = parameter(None, help="PHY only: transmit power, gain and pattern of antennas")
     shadowing: Shadowing | None = parameter(None, help="PHY only: loss in the surroundings, which varies with position")
     walls: Walls | None = parameter(None, help="PHY only: loss in obstacles that do not block")
     bodies: Bodies | None = parameter(None, help="PHY only: loss in robots between sender and receiver")
@@ -311,6 +311,7 @@ def _check_unit_disk(radio: Radio, where: str) -> None:
 
 def _check_phy(radio: Radio, where: str) -> None:
     refuse_unfit(radio.reception_or_default, radio.bit_rate_bps, where, "radio.reception")
+    check_pattern(radio.antenna_or_default.pattern, where, "radio.antenna.pattern")
     if radio.bodies_block:
         raise BadInput(where, "radio.bodies_block", "expected the model unit disk with it; a PHY has radio.bodies")
     if radio.walls is not None and radio.needs_line_of_sight:

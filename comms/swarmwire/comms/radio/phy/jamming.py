@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.line_of_sight import is_blocked
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndex
@@ -21,6 +22,7 @@ from swarmwire.comms.radio.phy import dcf
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.phy.reception import end_chunk
 from swarmwire.comms.radio.phy.state import JammerSchedule
+from swarmwire.comms.radio.propagation.antennas import losses_towards
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.propagation.path_loss import MeanLoss, loss_between_db
 
@@ -79,7 +81,13 @@ def powers_of(
 ) -> FloatArray:
     """Return the power of each jammer at each robot of its arena in mW, robots at `pose` (rows, 4); (k, robots)."""
     x, y, z = (np.ascontiguousarray(pose[:, column]) for column in (0, 1, 3))
-    return _powers(jammers, jammers.positions(pose), x, y, z, robots, obstacles, propagation)
+    position = jammers.positions(pose)
+    power_mw = _powers(jammers, position, x, y, z, robots, obstacles, propagation)
+    if propagation.directs:
+        heading = np.ascontiguousarray(pose[:, 2])
+        loss_db = losses_towards(propagation.patterns, x, y, z, heading, robots, jammers.arena, position)
+        power_mw *= portable.power(10.0, -0.1 * loss_db)
+    return power_mw
 
 
 @njit()

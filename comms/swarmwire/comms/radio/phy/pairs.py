@@ -1,7 +1,8 @@
 """Pairs of robots near enough to receive or to interfere, and the loss and fading gain between them.
 
-Power = transmit power + antenna gains - path loss - shadowing - walls - bodies + fading. All terms except the sender's
-power and the gains of events are equal in both directions and depend on poses only, so each pair is computed once.
+Power = transmit power + antenna gains - path loss - patterns - shadowing - walls - bodies + fading. Antenna gains are
+those of the main directions, and patterns lose dB against them. All terms except the sender's power and the gains of
+events are equal in both directions and depend on poses only, so each pair is computed once.
 Distances are in space; the fields of shadowing and fading lie in the plane, and do not change with height. A pair is
 omitted if path loss alone, or all terms without fading, give less than the cut-off. Measured strengths replace
 modelled strengths.
@@ -21,6 +22,7 @@ from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.phy.propagation import PropagationParams
 from swarmwire.comms.radio.propagation import fading, shadowing
+from swarmwire.comms.radio.propagation.antennas import add_pattern_losses
 from swarmwire.comms.radio.propagation.fading import field_gain
 from swarmwire.comms.radio.propagation.obstruction import BodyParams, bodies_between, wall_loss_db
 from swarmwire.comms.radio.propagation.path_loss import lifted, loss_db
@@ -34,7 +36,7 @@ class Pairs(NamedTuple):
 
     a: IntArray  # (k,)
     b: IntArray  # (k,)
-    loss_db: FloatArray  # (k,) from a to b, without antenna gains and fading
+    loss_db: FloatArray  # (k,) from a to b, against antennas that point at each other, without fading
     reverse_db: FloatArray  # (k,) from b to a: the same array, unless links were measured
     gain: FloatArray  # (k,) power gain of fading, a ratio
     blocked: BoolArray  # (k,) an obstacle blocks a required line of sight
@@ -62,6 +64,8 @@ def pairs_of(
     robot_index.sort(grid, pose.reshape(len(keys), robots, pose.shape[1]), running)
     order = robot_index.rows_in_order(grid, len(keys), robots)
     a, b, loss = _near(x, y, z, robots, grid, order, propagation)
+    if propagation.directs:
+        add_pattern_losses(loss, propagation.patterns, x, y, z, np.ascontiguousarray(pose[:, 2]), a, b)
     if propagation.shadows:
         _add_shadows(loss, x, y, robots, order, propagation.field, propagation.amplitude_db, a, b)
     if propagation.walls:

@@ -14,6 +14,7 @@ from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS, Lo
 from swarmwire.comms.radio.config.phy import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
+from swarmwire.comms.radio.propagation.antennas import AntennaPatterns, antenna_patterns
 from swarmwire.comms.radio.propagation.fading import FadingModel, fading_model, scatter_waves
 from swarmwire.comms.radio.propagation.path_loss import lifted, reach_m
 from swarmwire.comms.radio.propagation.shadowing import amplitude_db, field_waves
@@ -51,12 +52,12 @@ def sensitivity_of(radio: Radio) -> float:
 def range_of(radio: Radio) -> float | None:
     """Return the nominal range in m: the distance at which path loss alone reaches the sensitivity, or the unit disk's.
 
-    It is at most `range_m`, and that of robots on the floor.
+    It is at most `range_m`, and that of robots on the floor whose antennas point at each other.
     """
     if not radio.is_phy:
         return radio.range_m
     antenna = radio.antenna_or_default
-    max_loss_db = antenna.power_dbm + 2.0 * antenna.gain_dbi - sensitivity_of(radio)
+    max_loss_db = antenna.power_dbm + 2.0 * antenna.peak_dbi - sensitivity_of(radio)
     range_m = float(reach_m(radio.path_loss_model.curve(radio.frequency_hz), max_loss_db))
     return range_m if radio.range_m is None else min(range_m, radio.range_m)
 
@@ -72,8 +73,10 @@ SHADOWING_MARGIN = 2.5  # standard deviations of shadowing that a link may gain 
 class PropagationParams(NamedTuple):
     """Propagation parameters as numbers for kernels."""
 
-    send_dbm: FloatArray  # (rows,) transmit power and antenna gain
-    receive_dbi: FloatArray  # (rows,) antenna gain
+    send_dbm: FloatArray  # (rows,) transmit power and antenna gain in the main direction
+    receive_dbi: FloatArray  # (rows,) antenna gain in the main direction
+    directs: bool  # the gain of some antenna depends on the direction
+    patterns: AntennaPatterns
     curve: LossCurve
     max_loss_db: float  # no link has a greater path loss
     range_m: float  # no link is longer; inf: any distance
@@ -103,7 +106,8 @@ class PropagationParams(NamedTuple):
 def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationParams:
     """Return the parameters of the links of `radio`, which may be tuned, under the active disruption."""
     send_dbm, receive_dbi = _antennas_of(radio, context)
-    keys = context.keys
+    keys, antennas = context.keys, context.antennas.by_group(radio.antenna_or_default)
+    groups = np.arange(len(antennas))
     shadowing, walls, bodies, fading = radio.shadowing, radio.walls, radio.bodies, radio.fading
     curve = radio.path_loss_model.curve(radio.frequency_hz)
     model = fading_model(fading or Fading(), radio.frequency_hz, radio.propagation_mps or SPEED_OF_LIGHT_MPS)
@@ -114,6 +118,8 @@ def propagation_params_of(radio: Radio, context: ChannelContext) -> PropagationP
     return PropagationParams(
         send_dbm=send_dbm,
         receive_dbi=receive_dbi,
+        directs=any(antenna.is_directional for antenna in antennas),
+        patterns=antenna_patterns(antennas, np.tile(np.repeat(groups, context.antennas.counts), len(keys))),
         curve=curve,
         max_loss_db=max_loss_db,
         range_m=range_m,

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from swarmwire.comms.radio.analysis.coverage import (
     by_distance,
     coverage_map,
 )
-from swarmwire.comms.radio.config.phy import Antennas
+from swarmwire.comms.radio.config.antennas import Antenna, Antennas
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.deploy.runs.config import RunConfig
 from swarmwire.deploy.runs.plan import make_plan
@@ -55,7 +55,7 @@ def probe_coverage(
     payload_bytes: int | None = None,
     points: int = 200,
 ) -> CoverageProbe:
-    """Probe from a position, or from the start of a robot, the first one by default.
+    """Probe from a position, or from the start of a robot with its heading, the first one by default.
 
     The payload is the largest of the radio by default; the map has `points` along the longer side of the arena.
     BadInput for a scenario without a radio, or with measured links only, for a position outside the arena, and for an
@@ -77,29 +77,25 @@ def probe_coverage(
         raise BadInput("--bytes", "", f"expected 0 to {most}, which the radio takes; got {payload_bytes}")
     payload_bytes = most if payload_bytes is None else payload_bytes
     key = world.keys[0]
-    if position_m is None:
-        radio = _with_antenna_of(radio, plan.scenario, _index(static, robot))
-    coverage = RadioCoverage(
-        radio, key, ObstacleIndices(obstacle_arrays(static.obstacles[:1]), size_m, 0.0), payload_bytes
-    )
+    sender = None if position_m is not None else _antenna_of(radio, plan.scenario, _index(static, robot))
+    obstacles = ObstacleIndices(obstacle_arrays(static.obstacles[:1]), size_m, 0.0)
+    coverage = RadioCoverage(radio, key, obstacles, payload_bytes, sender)
+    heading_rad = float(start[2]) if position_m is None else None
     farthest_m = min(math.hypot(*size_m), MAX_RANGES * (static.range_m or math.inf))
     return CoverageProbe(
         static=static,
         payload_bytes=payload_bytes,
         sensitivity_dbm=coverage.sensitivity_dbm,
-        map=coverage_map(coverage, size_m, from_m, points),
+        map=coverage_map(coverage, size_m, from_m, points, heading_rad),
         distances=by_distance(coverage, size_m, key, farthest_m, DISTANCES),
     )
 
 
-def _with_antenna_of(radio: Radio, scenario: Scenario, index: int) -> Radio:
-    """Return the radio with the power and gain of a robot's group."""
-    if not radio.is_phy:
-        return radio
+def _antenna_of(radio: Radio, scenario: Scenario, index: int) -> Antenna:
+    """Return the antenna of a robot."""
     antennas = Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values())
-    antenna = radio.antenna_or_default
-    power_dbm = float(antennas.send_dbm(antenna)[index]) - antenna.gain_dbi
-    return replace(radio, antenna=replace(antenna, power_dbm=power_dbm))
+    group = int(np.searchsorted(np.cumsum(antennas.counts), index, side="right"))
+    return antennas.by_group(radio.antenna_or_default)[group]
 
 
 def _index(static: Static, robot: str | None) -> int:

@@ -16,8 +16,9 @@ from swarmwire.comms.base.atomic import check_output_path, output_file
 from swarmwire.comms.base.config import bounds_of, fault_of
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.ros2.bags import is_bag
+from swarmwire.comms.radio.config.antennas import Antenna
 from swarmwire.comms.radio.config.path_loss_models import LogDistance
-from swarmwire.comms.radio.config.phy import Antenna, Shadowing
+from swarmwire.comms.radio.config.phy import Shadowing
 from swarmwire.deploy.cli.actions.bag_logs import BagTopics, read_bag_logs
 from swarmwire.deploy.runs.scenario_parts import checked_radio
 from swarmwire.deploy.terminal.console import TerminalConsole

@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT
+from swarmwire.comms.radio.config.antennas import Antenna
 from swarmwire.comms.radio.config.impairments import Measures, RangeMeasure
-from swarmwire.comms.radio.config.phy import Access, Antenna, Fading, Reception, Shadowing
+from swarmwire.comms.radio.config.phy import Access, Fading, Reception, Shadowing
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption, Jammers
 from swarmwire.comms.radio.phy import model
