@@ -26,13 +26,21 @@ LIMIT = 0.03  # of a ratio to the stated figure, where it is a simulation's
 EXACT = 1e-4
 SENDERS, FRAME_BYTES, RATE_HZ, TICKS = 200, 30, 10, 300  # of ALOHA
 ROBOTS, SIDE_M = 200, 12.0  # of ARGoS's rule
+DRONES, ESB_OCTETS = 9, 32  # of polling
 BEGIN, WINDOW_BITS, OCTETS = 16, 6, 512  # of Bianchi: slots of the first window, doublings, payload
 
 
 def closed_forms() -> list[str]:
     """Lines of Markdown: what, by which source, what it states, what we have."""
     lines = ["| what | source | stated | ours | verdict |", "| --- " * 5 + "|"]
-    for quantity, source, stated, simulated, limit in [*_bit_errors(), *_airtimes(), *_aloha(), *_bianchi(), _argos()]:
+    for quantity, source, stated, simulated, limit in [
+        *_bit_errors(),
+        *_airtimes(),
+        *_aloha(),
+        *_bianchi(),
+        *_esb(),
+        _argos(),
+    ]:
         verdict = "within" if abs(simulated / stated - 1.0) <= limit else "**miss**"
         lines.append(f"| {quantity} | {source} | {stated:.5g} | {simulated:.5g} | {verdict} |")
     return lines
@@ -128,6 +136,32 @@ def bianchi_mbps(stations: int) -> float:
     )
     busy_us = data_us + _us(timing.sifs_ns) + ack_us + _us(timing.difs_ns)
     return 8.0 * OCTETS * alone / (idle * _us(timing.slot_ns) + (1.0 - idle) * busy_us)
+
+
+def _esb() -> Iterator[Line]:
+    source = "nRF24L01+ Product Specification v1.0, 7"
+    for rate, bit_rate_bps in (("250k", 250_000), ("1M", 1_000_000), ("2M", 2_000_000)):
+        frame_us = (8 * (1 + 5 + ESB_OCTETS + 2) + 9) * 1e6 / bit_rate_bps
+        exchange_us = ESB_OCTETS + 2 * 130 + 2 * frame_us + (6.0 if rate == "2M" else 8.2)
+        quantity = f"a station that polls {DRONES} drones at {rate}, {ESB_OCTETS} octets both ways, polls of each per s"
+        yield quantity, source, 1e6 / (DRONES * exchange_us), esb_polls_hz(f"crazyradio-{rate}", DRONES), EXACT
+
+
+def esb_polls_hz(preset: str, drones: int) -> float:
+    """Polls of each drone per second, by the intervals between its packets, if packets wait at all robots."""
+    radio, keys = (
+        radio_of(preset, ["radio.queue_limit=10000", "radio.send_offset=tick"]),
+        np.array([derive_key("polls")], np.uint64),
+    )
+    context = ChannelContext.open_space(radio, keys, drones + 1, (2.0, 2.0))
+    medium, pose, each = RadioMedium(context, 1), np.zeros((drones + 1, 3)), 20
+    drone, station = np.repeat(np.arange(1, drones + 1), each), np.zeros(drones * each, np.int64)
+    payloads = Payloads.from_rows([bytes(ESB_OCTETS)] * 2 * len(drone))
+    medium.step(0, pose)
+    medium.send(0, 0, SentPackets(np.append(station, drone), np.append(drone, station), payloads))
+    received = medium.step(tick_start_ns(5, 1), pose).received
+    at_ns = received.received_at_ns[(received.sender_index == 1) & (received.receiver == 0)]
+    return 1e9 / float(np.diff(at_ns).mean())
 
 
 def _argos() -> Line:

@@ -36,6 +36,15 @@ def test_avoidance_wanderers_neither_touch_nor_flock():
     assert (result.metrics["order"].mean or 0.0) < 0.5
 
 
+def test_crazyradio_drones_agree_through_their_station():
+    """Of 10 x 9 intended receptions in a round, the station's 9 and one of each drone happen: a share of 0.2."""
+    result = shipped("crazyradio")
+    assert final(result, "consensus_error") < 1e-9
+    assert result.radio is not None
+    assert set(result.radio.fates) >= {"received", "out_of_range"}
+    assert result.radio.fates["received"] == pytest.approx(0.2 * result.radio.intended, rel=0.01)
+
+
 def test_maze_wanderers_keep_to_its_corridors():
     with Simulation(ROOT / "scenarios" / "maze.toml") as simulation:
         boxes = simulation.plan.static.obstacles[0]

@@ -42,6 +42,7 @@ def check(scenario: Scenario, where: str) -> None:
         check_radio(scenario.radio, where)
         _check_torus(scenario, scenario.radio, where)
     _check_antennas(scenario, where)
+    _check_station(scenario, where)
     _check_motion(scenario, where)
     _check_relay(scenario, where)
     for i, event in enumerate(scenario.events):
@@ -91,6 +92,14 @@ def _check_antennas(scenario: Scenario, where: str) -> None:
             raise BadInput(where, f"robots.{group}.radio", f"expected a radio with a PHY: {reason}")
         if table.radio is not None:
             check_pattern(table.radio.pattern, where, f"robots.{group}.radio.pattern")
+
+
+def _check_station(scenario: Scenario, where: str) -> None:
+    name = scenario.radio.access_or_default.station if scenario.radio else None
+    robots = (*scenario.robots, *scenario.robot_names())
+    if name is not None and name not in robots:
+        expected = f"expected a group or a robot of the scenario, {did_you_mean(robots, name)}; got {name!r}"
+        raise BadInput(where, "radio.access.station", expected)
 
 
 def _check_motion(scenario: Scenario, where: str) -> None:

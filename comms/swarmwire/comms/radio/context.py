@@ -38,6 +38,7 @@ class ChannelContext:
     antennas: Antennas  # antennas of the robots of an arena
     disruption: ActiveDisruption
     running: BoolArray  # (arenas,) False: the arena has ended
+    stations: tuple[int, ...] = (0,)  # access "esb": indices in the arena of the robots that poll
     traces: LinkTraces | None = None  # content of the radio's trace file
     is_torus: bool = False  # opposite sides of an arena meet: shortest distances count
     threads: Threads = field(default_factory=Threads)

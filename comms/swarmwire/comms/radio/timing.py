@@ -1,4 +1,4 @@
-"""Timing of the standards: airtime of a frame, and channel access (IFS, CCA, backoff, contention window).
+"""Timing of the standards: airtime of a frame, and channel access (IFS, CCA, backoff, contention window, polling).
 
 Times are whole ns. Octets may be a number or an array of integers. Each standard states the octets that count; callers
 add the headers of higher layers.
@@ -17,6 +17,8 @@ Octets = TypeVar("Octets", int, IntArray)
 US = 1_000  # ns
 DSSS_RATES_BPS = (1_000_000, 2_000_000, 5_500_000, 11_000_000)
 OFDM_MANDATORY_BPS = (6_000_000, 12_000_000, 24_000_000)  # (17.3.1); all rates of DSSS are mandatory (18.1.1)
+ESB_RATES_BPS = (250_000, 1_000_000, 2_000_000)
+ESB_CONTROL_BITS = 9  # length 6, packet identity 2, no acknowledgement 1
 OFDM_BITS_PER_SYMBOL = {
     6_000_000: 24,
     9_000_000: 36,
@@ -126,6 +128,48 @@ class Dcf:
         return self.sifs_ns + self.aifsn * self.slot_ns
 
 
+@dataclass(frozen=True, slots=True)
+class Esb:
+    """Enhanced ShockBurst of the nRF24L01+, with the values that the Crazyradio's firmware sets.
+
+    Source: Nordic, nRF24L01+ Product Specification v1.0 (6.1.7, 7.3, 7.4.2 and 7.6); crazyradio-firmware, radio.c.
+    """
+
+    turnaround_ns: int = 130 * US  # Tstby2a, from standby, or between sending and receiving
+    upload_ns: int = 1 * US  # of an octet of a payload by SPI, at 8 Mbit/s
+    max_retries: int = 3  # ARC
+    max_payload_octets: int = 32
+    null_octets: int = 1  # CRTP's null packet, which is sent when nothing waits
+
+    def airtime_ns(self, frame_octets: Octets, rate_bps: int) -> Octets:
+        """Return the airtime: preamble 1 octet, address 5, packet control 9 bits, payload, CRC 2.
+
+        `frame_octets` are all but packet control.
+        """
+        return -(-(8 * frame_octets + ESB_CONTROL_BITS) * NS_PER_S // rate_bps)
+
+    def ard_ns(self, rate_bps: int) -> int:
+        """Return the auto-retransmit delay ARD, in steps of 250 us, for acknowledgements with 32 octets of payload.
+
+        It begins at the end of the frame.
+        """
+        return 1500 * US if rate_bps == ESB_RATES_BPS[0] else 500 * US
+
+    def irq_ns(self, rate_bps: int) -> int:
+        """Return T_IRQ, the delay of the interrupt; the specification has none for 250 kbit/s: as for 1 Mbit/s."""
+        return 6 * US if rate_bps == ESB_RATES_BPS[-1] else 8_200
+
+    def exchange_ns(self, payload_octets: int, answer_octets: int, frame_octets: int, rate_bps: int) -> int:
+        """Return T_ESB = T_UL + 2 Tstby2a + T_OA + T_ACK + T_IRQ: a poll and its answer, both with a payload.
+
+        `frame_octets` are those of a frame without payload.
+        """
+        on_air_ns = self.airtime_ns(frame_octets + payload_octets, rate_bps)
+        on_air_ns += self.airtime_ns(frame_octets + answer_octets, rate_bps)
+        return self.upload_ns * payload_octets + 2 * self.turnaround_ns + on_air_ns + self.irq_ns(rate_bps)
+
+
+ESB = Esb()
 IEEE_802_15_4 = UnslottedCsma()
 IEEE_802_11B = Dcf(10 * US, 20 * US, 31)  # DSSS and CCK
 IEEE_802_11A = Dcf(16 * US, 9 * US, 15)  # OFDM at 5 GHz

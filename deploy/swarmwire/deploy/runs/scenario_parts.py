@@ -73,7 +73,7 @@ def _checked_agent(scenario: Scenario, name: str, spec: str) -> AgentClass:
 
 def _unmet_need(need: str, scenario: Scenario) -> str:
     if need == "radio.tx_status":
-        return "needs a radio with acknowledgements: expected radio.access.method csma-802154 or dcf, acknowledged"
+        return "needs a radio with acknowledgements: expected radio.access.method csma-802154, dcf or esb, acknowledged"
     if scenario.radio is None:
         return "needs a radio: there is no [radio]"
     return f"the radio does not measure: [radio.measures] has {', '.join(scenario.radio.measures.needs) or 'nothing'}"
@@ -123,6 +123,7 @@ def new_medium(
         radius_m=np.tile(radius_m, len(world.keys)),
         height_m=np.tile(height_m, len(world.keys)),
         antennas=Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values()),
+        stations=scenario.stations(),
         traces=traces,
         is_torus=static.boundary == "torus",
         threads=Threads(threads),

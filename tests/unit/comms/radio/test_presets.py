@@ -37,7 +37,7 @@ from tests.support.comms.radio import (
 )
 from tests.unit.world.scenario.test_bodies import radio_of
 
-NEW = ("ble-1M", "kilobot", "gz-rfcomms", "subt", "acoustic")
+NEW = ("ble-1M", "crazyradio-250k", "crazyradio-1M", "crazyradio-2M", "kilobot", "gz-rfcomms", "subt", "acoustic")
 GAZEBO = ("gz-rfcomms", "subt")
 PARAMETERS = {
     value

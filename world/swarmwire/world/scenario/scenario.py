@@ -173,6 +173,13 @@ class Scenario(ScenarioTable):
             name: range(stop - self.robots[name].count, stop) for name, stop in zip(self.robots, stops, strict=True)
         }
 
+    def stations(self) -> tuple[int, ...]:
+        """Return the indices within an arena of the robots that poll all others, under the access method esb."""
+        name = self.radio.access_or_default.station if self.radio else None
+        if name is None:
+            return (0,)
+        return tuple(self.groups().get(name) or (self.robot_names().index(name),))
+
     def robot_names(self) -> tuple[str, ...]:
         """Return `group-i` for each robot index of an arena."""
         return tuple(f"{group}-{i}" for group, table in self.robots.items() for i in range(table.count))

@@ -11,6 +11,8 @@ from swarmwire.comms.base.arrays import IntArray
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.timing import (
     DSSS_RATES_BPS,
+    ESB,
+    ESB_CONTROL_BITS,
     IEEE_802_11A,
     IEEE_802_11B,
     IEEE_802_11G,
@@ -55,6 +57,8 @@ def airtime_ns(radio: Radio, frame_bytes: IntArray) -> IntArray:
         return ieee80211g_ns(frame_bytes, radio.bit_rate_bps)
     if radio.frame == "802.11n":
         return ieee80211n_ns(frame_bytes, radio.bit_rate_bps) + signal_extension_ns(radio)
+    if radio.frame == "esb":
+        return ESB.airtime_ns(frame_bytes, radio.bit_rate_bps)
     return at_bit_rate_ns(frame_bytes, radio.bit_rate_bps)
 
 
@@ -75,8 +79,15 @@ def signal_extension_ns(radio: Radio) -> int:
     return SIGNAL_EXTENSION_NS if is_2_ghz(radio) else 0
 
 
+def frame_bits(radio: Radio, frame_bytes: IntArray) -> IntArray:
+    """Bits of frames of these sizes that may be wrong, (k,)."""
+    return 8 * frame_bytes + (ESB_CONTROL_BITS if radio.frame == "esb" else 0)
+
+
 def acknowledgement_bytes(radio: Radio) -> int:
-    """Size of an acknowledgement."""
+    """Size of an acknowledgement; of esb, that of a null packet."""
+    if radio.frame == "esb":
+        return ESB.null_octets + radio.overhead_bytes
     return ACK_802154_BYTES if radio.frame == "plain" else ACK_80211_BYTES
 
 

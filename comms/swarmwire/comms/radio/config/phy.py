@@ -162,7 +162,7 @@ class ReceiverNoise:
         return noise_dbm(self.bandwidth_hz, self.figure_db)
 
 
-METHODS = ("none", "aloha", "csma-802154", "dcf")
+METHODS = ("none", "aloha", "csma-802154", "dcf", "esb")
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ class Access:
     method: str = parameter(
         "none",
         help="none: frames never interfere; aloha: frames interfere, and radios send at once; csma-802154: unslotted "
-        "CSMA/CA; dcf: CSMA/CA of IEEE 802.11",
+        "CSMA/CA; dcf: CSMA/CA of IEEE 802.11; esb: a station polls all others, which only answer",
         choices=METHODS,
     )
     acknowledged: bool = parameter(
@@ -202,12 +202,23 @@ class Access:
     )
     max_retries: int | None = parameter(
         None,
-        help="retries of a unicast packet; default: the standard's 3 (csma-802154) or 6 (dcf)",
+        help="retries of a unicast packet, up to 7, of a poll (ARC) up to 15; default: 3 (csma-802154, esb) or 6 (dcf)",
         at_least=0,
-        at_most=7,
+        at_most=15,
+    )
+    station: str | None = parameter(
+        None,
+        help="esb only: the robot, or the group of robots, that polls all others; default: the first robot",
+    )
+    host_delay_s: float = parameter(
+        0.0,
+        help="esb only: time that the station's computer and USB take for an exchange beyond the radio's own",
+        unit="s",
+        at_least=0,
+        at_most=1,
     )
 
     @property
     def acknowledges(self) -> bool:
         """True if senders get a transmit status for each unicast packet."""
-        return self.acknowledged and self.method in ("csma-802154", "dcf")
+        return self.acknowledged and self.method in ("csma-802154", "dcf", "esb")

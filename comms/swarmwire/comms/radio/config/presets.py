@@ -135,6 +135,44 @@ SIMULATORS: dict[str, Preset] = {
 }
 
 
+def _crazyradio(bit_rate_bps: int, sensitivity_dbm: float) -> "Preset":
+    """Return the preset of a Crazyradio; its noise figure follows from the sensitivity, at 0.1 % of bits wrong."""
+    sinr_db = 10.0 * portable.log10(-2.0 * portable.log(2.0 * 1e-3))  # as in `fsk_success`
+    thermal_dbm = -173.975 + 10.0 * portable.log10(float(bit_rate_bps))
+    kilobits = bit_rate_bps // 1000
+    rate = f"{kilobits // 1000} Mbit/s" if kilobits >= 1000 else f"{kilobits} kbit/s"
+    return Preset(
+        f"Bitcraze's Crazyradio PA and Crazyflies at {rate}, 20 dBm, sensitivity {sensitivity_dbm:g} dBm: a station "
+        "polls, drones answer; 32 bytes",
+        "Nordic, nRF24L01+ Product Specification v1.0, 6 and 7; crazyradio-firmware, radio.c; Bitcraze, Crazyradio PA",
+        {
+            "model": "log-distance",
+            "frequency_hz": 2.48e9,  # channel 80, the default of cflib and of the firmware
+            "bit_rate_bps": bit_rate_bps,
+            "frame": "esb",
+            "overhead_bytes": 8,  # preamble 1, address 5, check 2; the frame adds 9 bits of packet control
+            "max_payload_bytes": 32,
+            "queue_limit": 64,
+            "log_distance": {"exponent": 3.0},
+            "antenna": {"power_dbm": 20.0},
+            "noise": {
+                "bandwidth_hz": float(bit_rate_bps),
+                "figure_db": round(sensitivity_dbm - sinr_db - thermal_dbm, 2),
+            },
+            "reception": {
+                "model": "table",
+                "table": fsk_success(),
+                "preamble_sinr_db": 5.0,  # below it, hardly any address is received
+                "sensitivity_dbm": sensitivity_dbm,
+            },
+            "access": {"method": "esb"},
+        },
+        "stations share one channel; a receiver locks to frames with other addresses, too; the sensitivity is that of "
+        "the chip without the amplifier for reception; without Safelink, which cflib adds: a packet ends after ARC "
+        "repetitions",
+    )
+
+
 # Presets of radio standards, with their timing.
 
 
@@ -238,6 +276,13 @@ STANDARDS: dict[str, Preset] = {
         "one channel, where advertisers send on three in turn, and a scanner that never pauses; errors are those of "
         "binary FSK, with interference as noise",
     ),
+}
+
+
+STANDARDS |= {
+    "crazyradio-250k": _crazyradio(250_000, -94.0),
+    "crazyradio-1M": _crazyradio(1_000_000, -85.0),
+    "crazyradio-2M": _crazyradio(2_000_000, -82.0),
 }
 
 

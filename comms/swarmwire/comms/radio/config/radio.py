@@ -23,7 +23,7 @@ from swarmwire.comms.radio.config.phy import (
     refuse_unfit,
 )
 from swarmwire.comms.radio.config.presets import PRESETS
-from swarmwire.comms.radio.timing import DSSS_RATES_BPS, HT_BITS_PER_SYMBOL, OFDM_BITS_PER_SYMBOL
+from swarmwire.comms.radio.timing import DSSS_RATES_BPS, ESB, ESB_RATES_BPS, HT_BITS_PER_SYMBOL, OFDM_BITS_PER_SYMBOL
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ DATAGRAM_BYTES = 28  # IPv4 and UDP headers
 MIN_MTU_BYTES = 68  # IPv4 (RFC 791)
 POSITIONS = ("held", "interpolated")
 MODELS = ("unit-disk", "log-distance", "friis", "two-ray", "itu-indoor")
-FRAMES = ("plain", "802.11a", "802.11b", "802.11g", "802.11n")
+FRAMES = ("plain", "802.11a", "802.11b", "802.11g", "802.11n", "esb")
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class Radio:
         IEEE 802.11 replaces Ethernet's header by its own, and `overhead_bytes` counts the IPv4 and UDP headers of
         messages, which a frame contains. Other radios carry the entire frame.
         """
-        return 0 if self.frame == "plain" else HEADER_BYTES + DATAGRAM_BYTES
+        return HEADER_BYTES + DATAGRAM_BYTES if self.frame.startswith("802.11") else 0
 
     @property
     def mtu_bytes(self) -> int:
@@ -239,12 +239,22 @@ RECEPTIONS = {  # besides threshold and table
     "802.11b": ("802.11b",),
     "802.11g": OFDM_MODELS,
     "802.11n": OFDM_MODELS,
+    "esb": (),
+}
+ACCESS_KEYS = {  # methods of keys of [radio.access] that only some have
+    "cca_threshold_dbm": ("csma-802154", "dcf"),
+    "max_retries": ("csma-802154", "dcf", "esb"),
+    "cca_sensitivity_dbm": ("dcf",),
+    "cca_time_s": ("dcf",),
+    "station": ("esb",),
+    "host_delay_s": ("esb",),
 }
 RATES_BPS = {
     "802.11a": tuple(OFDM_BITS_PER_SYMBOL),
     "802.11b": DSSS_RATES_BPS,
     "802.11g": tuple(OFDM_BITS_PER_SYMBOL),
     "802.11n": tuple(HT_BITS_PER_SYMBOL),
+    "esb": ESB_RATES_BPS,
 }
 
 
@@ -316,23 +326,31 @@ def _check_phy(radio: Radio, where: str) -> None:
         raise BadInput(where, "radio.bodies_block", "expected the model unit disk with it; a PHY has radio.bodies")
     if radio.walls is not None and radio.needs_line_of_sight:
         raise BadInput(where, "radio.walls", "expected no line_of_sight with it: obstacles either block or weaken")
-    if radio.access_or_default.method == "dcf" and radio.frame == "plain":
+    method = radio.access_or_default.method
+    if method == "dcf" and not radio.frame.startswith("802.11"):
         raise BadInput(where, "radio.access.method", 'expected a frame of IEEE 802.11 for "dcf", such as 802.11b')
-    if radio.access_or_default.method == "csma-802154" and radio.frame != "plain":
+    if method == "csma-802154" and radio.frame != "plain":
         raise BadInput(where, "radio.access.method", f'expected frame = "plain" for "csma-802154", got {radio.frame}')
+    if (method == "esb") != (radio.frame == "esb"):
+        raise BadInput(where, "radio.access.method", f'expected "esb" with frame = "esb" alone; got {method}')
+    if method == "esb" and not radio.access_or_default.acknowledged:
+        raise BadInput(where, "radio.access.acknowledged", "expected true with method esb: an answer is one")
+    if method == "esb" and radio.max_payload_bytes > ESB.max_payload_octets:
+        expected = f"expected at most {ESB.max_payload_octets} with frames of esb; got {radio.max_payload_bytes}"
+        raise BadInput(where, "radio.max_payload_bytes", expected)
 
 
 def _check_fits(radio: Radio, where: str) -> None:
     """Raise BadInput for a key that the chosen access, reception, frame or fading does not use."""
     access, reception, fading = radio.access_or_default, radio.reception_or_default, radio.fading
-    for name in ("cca_threshold_dbm", "max_retries"):
-        if getattr(access, name) is not None and access.method not in ("csma-802154", "dcf"):
-            raise BadInput(
-                where, f"radio.access.{name}", f'expected method csma-802154 or dcf with it, got "{access.method}"'
-            )
-    for name in ("cca_sensitivity_dbm", "cca_time_s"):
-        if getattr(access, name) is not None and access.method != "dcf":
-            raise BadInput(where, f"radio.access.{name}", f'expected method dcf with it, got "{access.method}"')
+    for name, methods in ACCESS_KEYS.items():
+        if getattr(access, name) != getattr(Access, name) and access.method not in methods:
+            expected = f"expected method {' or '.join(methods)} with it"
+            raise BadInput(where, f"radio.access.{name}", f'{expected}, got "{access.method}"')
+    max_retries = 15 if access.method == "esb" else 7
+    if (access.max_retries or 0) > max_retries:
+        expected = f"expected at most {max_retries} with method {access.method}; got {access.max_retries}"
+        raise BadInput(where, "radio.access.max_retries", expected)
     fits = ("threshold", "table", *RECEPTIONS.get(radio.frame, (reception.model,)))
     if reception.model not in fits:
         expected = f"expected one of {', '.join(fits)} for frames of {radio.frame}; got {reception.model}"

@@ -80,11 +80,11 @@ def send(params, state, events, buffer, r, now_ns):
     packet.on_air_at_ns = now_ns
     robot.mac_state = SENDING
     if state.switch.is_on[r]:
-        _use_current_links(state, r)
+        use_current_links(state, r)
     else:
         packet.fate = state.switch.drop_fate[r]
         robot.first_link = robot.weak_link = robot.stop_link = 0  # no links; pragma: no mutate (any empty range does)
-    robot.on_air, robot.to = DATA, packet.to
+    robot.on_air, robot.to, robot.sequence = DATA, packet.to, packet.sequence
     robot.rate = params.data_rate if packet.to != BROADCAST else params.broadcast_rate
     robot.duration_ns = params.data_duration_ns if packet.to != BROADCAST else 0
     reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns, packet.bits)
@@ -141,14 +141,14 @@ def send_ack(params, state, events, r, now_ns):
     robot = state.robot[r]
     if robot.on_air != SILENT or robot.mac_state == TURNAROUND or not state.switch.is_on[r]:
         return
-    _use_current_links(state, r)
+    use_current_links(state, r)
     robot.on_air, robot.to, robot.duration_ns = ACKNOWLEDGEMENT, robot.ack_to, 0
     robot.rate = params.ack_rate
     reception.start_frame(params, state, events, r, now_ns, params.ack_airtime_ns, params.ack_bits)
 
 
 @kernel()
-def _use_current_links(state, r):
+def use_current_links(state, r):
     """Use the robot's links under the current poses for its next frame."""
     robot, links = state.robot[r], state.links
     robot.first_link, robot.weak_link, robot.stop_link = links.first[r], links.weak[r], links.stop[r]

@@ -18,7 +18,7 @@ from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.liveness import LivenessHistory
 from swarmwire.comms.radio.model import RadioModel
-from swarmwire.comms.radio.phy import jamming, mac, tx_queue
+from swarmwire.comms.radio.phy import esb, jamming, mac, tx_queue
 from swarmwire.comms.radio.phy.event_queue import event_queue
 from swarmwire.comms.radio.phy.graph import RadioGraph
 from swarmwire.comms.radio.phy.jamming import JammerTable
@@ -129,6 +129,9 @@ class SinrPhy(RadioModel):
         self._order, self._start = np.empty(0, np.int64), np.zeros(rows + 1, np.int64)
         self._is_new, self._next_ns, self._buffer = True, 0, result_buffer(MIN_CAPACITY)
         self._switch = tx_queue.switches_of(context.disruption)
+        is_esb = context.radio.access_or_default.method == "esb"
+        self._esb_timing = esb.esb_timing(context.radio) if is_esb else None
+        self._polling = esb.new_polling(context.stations, context.robots, len(context.keys)) if is_esb else None
         self._pose_id, self._poses = 0, {0: np.zeros((rows, 4))}
         self._now_ns = self._poses_from_ns = self._last_rows = 0
         self._tx_status: list[TxStatuses] = []
@@ -168,6 +171,7 @@ class SinrPhy(RadioModel):
         context = replace(self._context, radio=radio)
         self._radio, self._params = radio, phy_params_of(radio, self._context.robots)
         self._frames = frames_of(radio)
+        self._esb_timing = self._esb_timing and esb.esb_timing(radio)
         self._losses.tune(context, at_ns)
         self._graph.tune(radio, self._params)
         self._reports.tune(context)
@@ -203,9 +207,15 @@ class SinrPhy(RadioModel):
         while next_ns == mac.BUFFER_IS_FULL:
             if parts:
                 buffer = result_buffer(capacity)
-            next_ns = mac.run_until(
-                self._params, losses, state, self._events, buffer, max_links, until_ns, self._start, self._is_new
-            )
+            if self._polling is None:
+                next_ns = mac.run_until(
+                    self._params, losses, state, self._events, buffer, max_links, until_ns, self._start, self._is_new
+                )
+            else:
+                next_ns = esb.run_until(
+                    *(self._params, self._esb_timing, self._polling, losses, state, self._events, buffer, max_links),
+                    *(self._now_ns, until_ns, self._start, self._is_new),
+                )
             self._is_new = False
             parts.append(buffer)
         self._next_ns = next_ns
@@ -217,9 +227,13 @@ class SinrPhy(RadioModel):
         state = self._state(tx_queue.switches_of(disruption), at_ns)
         mac.order_queues(state, self._events, self._start)
         buffer = result_buffer(len(self._packets) + 1)
+        if self._polling is not None:
+            esb.end_exchanges(self._polling, state, self._events, buffer, at_ns)
         mac.stop_dead(state, self._events, buffer, disruption.alive, at_ns)
         mac.end_receptions(self._params, state, self._events, disruption.alive, disruption.radio_on, at_ns)
         tx_queue.switch(self._params, state, self._events, buffer, at_ns)
+        if self._polling is not None:
+            esb.resume(self._params, self._polling, state, self._events, buffer, at_ns)
         self._report([buffer], liveness)
 
     def tx_status(self, alive: BoolArray) -> TxStatuses:
@@ -237,7 +251,8 @@ class SinrPhy(RadioModel):
 
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """Return the edges of the radio graph, robot rows a < b, sorted, (e, 2)."""
-        return self._graph.edges(pose, alive, self._poses_from_ns)
+        edges = self._graph.edges(pose, alive, self._poses_from_ns)
+        return edges if self._polling is None else edges[esb.are_linked(self._polling, edges[:, 0], edges[:, 1])]
 
     def _propagation_params(self) -> PropagationParams:
         now = self._context.disruption

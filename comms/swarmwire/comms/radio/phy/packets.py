@@ -10,7 +10,7 @@ import numpy as np
 from swarmwire.comms.base.arrays import AnyArray, IntArray, Table
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_PACKET, NO_ROBOT, NO_TX_STATUS, NOWHERE, UNDER_WAY
-from swarmwire.comms.radio.config.frames import airtime_ns, broadcast_airtime_ns
+from swarmwire.comms.radio.config.frames import airtime_ns, broadcast_airtime_ns, frame_bits
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.links import fill_remainder
 from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET
@@ -115,7 +115,8 @@ def frames_of(radio: Radio) -> Frames:
     ifs_ns = np.zeros(len(sizes), np.int64)
     if radio.access_or_default.method == "csma-802154":
         ifs_ns = IEEE_802_15_4.ifs_ns(sizes - HEADER_BYTES)
-    return Frames(headers_bytes, 8 * sizes, airtime_ns(radio, sizes), broadcast_airtime_ns(radio, sizes), ifs_ns)
+    bits = frame_bits(radio, sizes)
+    return Frames(headers_bytes, bits, airtime_ns(radio, sizes), broadcast_airtime_ns(radio, sizes), ifs_ns)
 
 
 @njit()

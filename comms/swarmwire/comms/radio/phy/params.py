@@ -21,7 +21,7 @@ from swarmwire.comms.radio.phy.propagation import cut_off_dbm, receiver_for, sen
 from swarmwire.comms.radio.phy.reception import log_success_table
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sinr_for_db
-from swarmwire.comms.radio.timing import IEEE_802_15_4
+from swarmwire.comms.radio.timing import ESB, IEEE_802_15_4
 
 CERTAIN = 1.0 - 1e-12
 FOREVER_NS = 2**62
@@ -75,7 +75,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     """Return the PHY parameters of a radio; each arena has `robots` robots."""
     reception, access, receiver = radio.reception_or_default, radio.access_or_default, receiver_for(radio)
     csma, dcf = IEEE_802_15_4, dcf_of(radio)
-    is_dcf = access.method == "dcf"
+    is_dcf, is_esb = access.method == "dcf", access.method == "esb"
     cca_threshold_dbm = access.cca_threshold_dbm
     if cca_threshold_dbm is None:
         cca_threshold_dbm = dcf.cca_ed_dbm if is_dcf else sensitivity_of(radio) + csma.cca_ed_above_sensitivity_db
@@ -84,11 +84,13 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         cca_sensitivity_dbm = dcf.cca_sensitivity_dbm
     max_retries = access.max_retries
     if max_retries is None:
-        max_retries = dcf.max_retries if is_dcf else csma.max_retries
+        max_retries = (dcf if is_dcf else ESB if is_esb else csma).max_retries
     ack_bytes = acknowledgement_bytes(radio)
     ack_ns = acknowledgement_ns(radio)
-    sifs_ns = dcf.sifs_ns if is_dcf else csma.turnaround_ns
+    turnaround_ns = ESB.turnaround_ns if is_esb else csma.turnaround_ns
+    sifs_ns = dcf.sifs_ns if is_dcf else turnaround_ns
     sets_nav = is_dcf and access.acknowledges
+    esb_timeout_ns = ESB.ard_ns(radio.bit_rate_bps)
     dcf_timeout_ns = sifs_ns + ack_ns + dcf.slot_ns
     # The standard's value at its bit rate; longer where an acknowledgement at a lower bit rate takes longer.
     csma_timeout_ns = max(csma.ack_wait_ns, sifs_ns + ack_ns + csma.backoff_ns)
@@ -110,10 +112,10 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         sifs_ns=sifs_ns,
         ack_airtime_ns=ack_ns,
         ack_bits=8 * ack_bytes,
-        ack_timeout_ns=dcf_timeout_ns if is_dcf else csma_timeout_ns,
+        ack_timeout_ns=dcf_timeout_ns if is_dcf else esb_timeout_ns if is_esb else csma_timeout_ns,
         backoff_ns=csma.backoff_ns,
         cca_ns=csma.cca_ns,
-        turnaround_ns=csma.turnaround_ns,
+        turnaround_ns=turnaround_ns,
         min_be=csma.min_be,
         max_be=csma.max_be,
         max_backoffs=csma.max_backoffs,

@@ -95,7 +95,7 @@ def fate_of_frame(params, losses, state, s, i, frame_log_success):
         sequence, attempt = state.packet[data_sender.packet].sequence, data_sender.attempt
         draw_purpose = ACKNOWLEDGED
     else:
-        sequence, attempt, draw_purpose = state.packet[sender.packet].sequence, sender.attempt, RECEPTION
+        sequence, attempt, draw_purpose = sender.sequence, sender.attempt, RECEPTION
     u = uniform(key, a, b, sequence, draw_purpose + attempt)
     # exp(x) is at least 1 + x: most frames need no exponential.
     if u >= 1.0 + frame_log_success and u >= math_compiled.exp(frame_log_success):

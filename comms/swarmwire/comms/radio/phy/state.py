@@ -43,6 +43,7 @@ ROBOT = record_type(
         ("airtime_ns", _I),
         ("bits", _I),
         ("rate", _I),  # row of its bit rate in `PhyParams.log_success`
+        ("sequence", _I),  # DATA: key of the draws of its reception
         ("to", _I),  # robot row, BROADCAST or NOWHERE
         ("duration_ns", _I),  # DCF: field Duration of the header, time reserved after the frame
         ("first_link", _I),  # first strong link: fates of strong links are recorded
