@@ -276,10 +276,6 @@ STANDARDS: dict[str, Preset] = {
         "one channel, where advertisers send on three in turn, and a scanner that never pauses; errors are those of "
         "binary FSK, with interference as noise",
     ),
-}
-
-
-STANDARDS |= {
     "crazyradio-250k": _crazyradio(250_000, -94.0),
     "crazyradio-1M": _crazyradio(1_000_000, -85.0),
     "crazyradio-2M": _crazyradio(2_000_000, -82.0),
