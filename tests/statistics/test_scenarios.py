@@ -181,6 +181,17 @@ def test_infrared_is_blocked_by_obstacles_and_robots_only():
     assert final(shipped_run, "largest_component") == 1.0
 
 
+def test_sector_station_with_a_patch_reaches_fewer_scouts_than_in_all_directions():
+    """Those beside and behind it are out of range more often."""
+    patch, around = (
+        shipped("sector", ["duration_s=20", *changes]).radio
+        for changes in ((), ["robots.station.radio={gain_dbi=8.0, pattern={model='omnidirectional'}}"])
+    )
+    assert patch is not None
+    assert around is not None
+    assert patch.in_range < around.in_range - 2000
+
+
 def test_warehouse_racks_halve_receivers_in_range_and_fragment_the_flock():
     racks, none = shipped("warehouse-wifi"), shipped("warehouse-wifi", ["arena.obstacles=[]"])
     assert racks.radio is not None
