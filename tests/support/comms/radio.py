@@ -72,6 +72,15 @@ WIFI_B = replace(
     noise=ReceiverNoise(22e6, 7.0),
     reception=Reception("802.11b", preamble_sinr_db=4.0, capture_window_s=4e-6),
 )
+WIFI_N = replace(
+    WIFI_B,
+    frame="802.11n",
+    bit_rate_bps=65_000_000,
+    overhead_bytes=38,
+    noise=ReceiverNoise(20e6, 7.0),
+    reception=Reception("802.11ag", preamble_sinr_db=4.0, capture_window_s=4e-6),
+    access=Access("dcf"),
+)
 ALL_MEASURES = Measures(RangeMeasure(0.1), BearingMeasure(0.1), RssiMeasure(0.5))
 METHODS = ("none", "aloha", "csma-802154", "dcf")
 
@@ -296,7 +305,7 @@ def drawing(method: str) -> Radio:
 @st.composite
 def signal_radios(draw: st.DrawFn) -> Radio:
     """Every method, with and without all that may be added; slow enough that frames outlast ticks."""
-    radio = with_access(draw(st.sampled_from(METHODS)))
+    radio = draw(st.sampled_from([*map(with_access, METHODS), WIFI_N]))
     slow = radio.frame == "plain" and draw(st.booleans())
     walls = draw(st.sampled_from([None, Walls(9.0)]))
     return replace(

@@ -55,6 +55,8 @@ The world's loop calls `step` and then `send` in each tick. What these call, and
     |  RadioModel.set_poses          model.py                  poses of the new tick
     |  RadioModel.edges              model.py                  radio graph under these poses
 
+A PHY of 802.11n has the events of `phy/ht/events.py` in place of those of `phy/mac.py` and `phy/tx_queue.py`.
+
 `RadioMedium.advance` and `send_at` do the same for a part of a tick. `context.py` holds what both models and all stages
 get: the radio, the arenas and the robots. `config/` has the parameters of a radio, `propagation/` and `reception/` the
 formulas of the PHY, `analysis/` computations without a run.

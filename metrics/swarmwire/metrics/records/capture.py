@@ -43,8 +43,8 @@ DATA, ACKNOWLEDGE, SAME_PAN, SHORT_TO, SHORT_FROM = 0x0001, 0x0020, 0x0040, 0x08
 
 RADIOTAP_FIELDS = 1 << 1 | 1 << 2 | 1 << 3  # flags, rate, channel
 RADIOTAP_STRENGTH = 1 << 5
-RADIOTAP_MCS = 1 << 19
-MCS_KNOWN = 0x0F  # bandwidth, index, guard interval and format are known: 20 MHz, long, HT-mixed
+RADIOTAP_RATE, RADIOTAP_MCS = 1 << 2, 1 << 19
+MCS_KNOWN, HT_KNOWN = 0x02, 0x0D  # bandwidth, guard interval and format: 20 MHz, long, HT-mixed
 CCK, OFDM, BAND_2_GHZ, BAND_5_GHZ = 0x0020, 0x0040, 0x0080, 0x0100  # channel flags
 DATA_FRAME, QOS_DATA_FRAME = 0x0008, 0x0088  # frame control: data between stations of an ad hoc network
 NETWORK = bytes.fromhex("025357000000")  # the BSSID
@@ -153,8 +153,9 @@ def _radiotap(radio: Radio, frame: CapturedFrame) -> bytes:
         present |= RADIOTAP_STRENGTH
         fields += struct.pack("<b", max(-128, min(round(frame.rssi_dbm), 127)))
     if is_ht:
-        present |= RADIOTAP_MCS
-        fields += struct.pack("<BBB", MCS_KNOWN, 0, list(HT_BITS_PER_SYMBOL).index(radio.bit_rate_bps))
+        present = present ^ RADIOTAP_RATE | RADIOTAP_MCS
+        known = HT_KNOWN | (MCS_KNOWN if radio.access_or_default.rate_control == "fixed" else 0)
+        fields += struct.pack("<BBB", known, 0, list(HT_BITS_PER_SYMBOL).index(radio.bit_rate_bps))
     return struct.pack("<BBHI", 0, 0, 8 + len(fields), present) + fields
 
 

@@ -93,6 +93,19 @@ def test_ieee_802_11_has_a_radiotap_header_and_udp():
     assert header(radio).startswith(joined("00 00 0e00 0e000000 00 02 6c09 a000 0800"))
 
 
+def test_ieee_802_11n_frame_has_its_mcs_and_qos_control():
+    radio = radio_of({"preset": "wifi-n-5G", "bit_rate_bps": 39_000_000})
+    # Flags, padding, 5180 MHz, OFDM at 5 GHz, then 20 MHz, long guard interval, HT-mixed, MCS 4.
+    radiotap = joined("00 00 1100 0a000800 00 00 3c14 4001 0f 00 04")
+    # QoS data; reserves SIFS and an acknowledgement at 24 Mbit/s: 16 + 28 us.
+    mac = joined("8800 2c00", "025357000003", "025357000018", "025357000000", "4023", "0000")
+    assert header(radio, to=2).startswith(radiotap + mac + "aaaa030000000800")
+    adaptive = radio_of({"preset": "wifi-n-5G", "access": {"rate_control": "aarf"}})
+    assert header(adaptive, to=2).startswith(joined("00 00 1100 0a000800 00 00 3c14 4001 0d"))
+    # A broadcast is an OFDM frame: rate 12 x 500 kbit/s.
+    assert header(radio).startswith(joined("00 00 0e00 0e000000 00 0c 3c14 4001", "8800"))
+
+
 @pytest.mark.parametrize(("preset", "duration_us"), [("wifi-b-1M", 10 + 192 + 112), ("wifi-a-6M", 16 + 44)])
 def test_addressed_wifi_frame_reserves_the_air_for_its_acknowledgement(preset: str, duration_us: int):
     found = bytes.fromhex(header(radio_of({"preset": preset}), to=2))

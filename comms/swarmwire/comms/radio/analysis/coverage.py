@@ -24,7 +24,7 @@ from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, sensitivity_of
-from swarmwire.comms.radio.phy.reception import lone_deliveries
+from swarmwire.comms.radio.phy.success import lone_deliveries
 from swarmwire.comms.radio.propagation.antennas import add_pattern_losses, antenna_patterns
 from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.propagation.fading import fading_gain, fading_model

@@ -13,6 +13,7 @@ from swarmwire.comms.radio.timing import (
     DSSS_RATES_BPS,
     ESB,
     ESB_CONTROL_BITS,
+    HT_BITS_PER_SYMBOL,
     IEEE_802_11A,
     IEEE_802_11B,
     IEEE_802_11G,
@@ -60,6 +61,11 @@ def airtime_ns(radio: Radio, frame_bytes: IntArray) -> IntArray:
     if radio.frame == "esb":
         return ESB.airtime_ns(frame_bytes, radio.bit_rate_bps)
     return at_bit_rate_ns(frame_bytes, radio.bit_rate_bps)
+
+
+def range_rate_bps(radio: Radio) -> int:
+    """Bit rate of the data frames that reach farthest: with rate control the lowest."""
+    return min(HT_BITS_PER_SYMBOL) if radio.access_or_default.rate_control != "fixed" else radio.bit_rate_bps
 
 
 def broadcast_rate_bps(radio: Radio) -> int:

@@ -162,6 +162,7 @@ class ReceiverNoise:
         return noise_dbm(self.bandwidth_hz, self.figure_db)
 
 
+RATE_CONTROLS = ("fixed", "ideal", "aarf")
 METHODS = ("none", "aloha", "csma-802154", "dcf", "esb")
 
 
@@ -202,7 +203,8 @@ class Access:
     )
     max_retries: int | None = parameter(
         None,
-        help="retries of a unicast packet, up to 7, of a poll (ARC) up to 15; default: 3 (csma-802154, esb) or 6 (dcf)",
+        help="retries of a unicast packet, up to 7, of a poll (ARC) up to 15; default: 3 (csma-802154, esb) or 6 (dcf),"
+        " with 802.11n no limit but queue_lifetime_s",
         at_least=0,
         at_most=15,
     )
@@ -216,6 +218,26 @@ class Access:
         unit="s",
         at_least=0,
         at_most=1,
+    )
+    aggregation_bytes: int | None = parameter(
+        None,
+        help="802.11n only: most bytes of packets that one frame aggregates (A-MPDU); 0: none; default: 65535",
+        unit="byte",
+        at_least=0,
+        at_most=65535,
+    )
+    rts_threshold_bytes: int | None = parameter(
+        None,
+        help="802.11n only: RTS and CTS precede frames of more bytes to one robot; default: none",
+        unit="byte",
+        at_least=0,
+        at_most=65535,
+    )
+    rate_control: str = parameter(
+        "fixed",
+        help="802.11n only: bit rate of packets to one robot, at most bit_rate_bps. fixed: that rate; ideal: the "
+        "highest for the last SINR at the receiver; aarf: by successes and failures",
+        choices=RATE_CONTROLS,
     )
 
     @property

@@ -329,6 +329,8 @@ def _check_phy(radio: Radio, where: str) -> None:
     method = radio.access_or_default.method
     if method == "dcf" and not radio.frame.startswith("802.11"):
         raise BadInput(where, "radio.access.method", 'expected a frame of IEEE 802.11 for "dcf", such as 802.11b')
+    if method != "dcf" and radio.frame == "802.11n":
+        raise BadInput(where, "radio.access.method", f'expected "dcf" for frames of 802.11n, got "{method}"')
     if method == "csma-802154" and radio.frame != "plain":
         raise BadInput(where, "radio.access.method", f'expected frame = "plain" for "csma-802154", got {radio.frame}')
     if (method == "esb") != (radio.frame == "esb"):
@@ -351,6 +353,9 @@ def _check_fits(radio: Radio, where: str) -> None:
     if (access.max_retries or 0) > max_retries:
         expected = f"expected at most {max_retries} with method {access.method}; got {access.max_retries}"
         raise BadInput(where, "radio.access.max_retries", expected)
+    for name in ("aggregation_bytes", "rts_threshold_bytes", "rate_control"):
+        if getattr(access, name) != getattr(Access, name) and radio.frame != "802.11n":
+            raise BadInput(where, f"radio.access.{name}", f'expected frame = "802.11n" with it, got "{radio.frame}"')
     fits = ("threshold", "table", *RECEPTIONS.get(radio.frame, (reception.model,)))
     if reception.model not in fits:
         expected = f"expected one of {', '.join(fits)} for frames of {radio.frame}; got {reception.model}"

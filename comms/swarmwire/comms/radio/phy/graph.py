@@ -20,7 +20,7 @@ from swarmwire.comms.radio.phy.jamming import JammerTable
 from swarmwire.comms.radio.phy.link_table import LinkTable
 from swarmwire.comms.radio.phy.pairs import Pairs
 from swarmwire.comms.radio.phy.params import PhyParams
-from swarmwire.comms.radio.phy.reception import lone_deliveries, lone_delivery
+from swarmwire.comms.radio.phy.success import lone_deliveries, lone_delivery
 from swarmwire.comms.radio.stages.losses import LossChain
 
 NEGLIGIBLE_POWER_RATIO = 1e-3  # power of a jammer / noise power

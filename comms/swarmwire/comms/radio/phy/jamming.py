@@ -143,6 +143,6 @@ def _refresh_arena(params, state, events, arena, now_ns):
             if jam.arena[j] == arena and jam.is_on[j]:
                 jam_mw += jam.power_mw[j, i]
         rx = state.reception[r]
-        end_chunk(params, state.robot, rx, now_ns)
+        end_chunk(state.ht, params, state.robot, rx, r, now_ns)
         rx.jam_mw = jam_mw
         dcf.sense(params, state, events, r, now_ns)

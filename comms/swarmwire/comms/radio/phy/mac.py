@@ -31,6 +31,8 @@ RECEIVED, CHANNEL_BUSY = int(Fate.RECEIVED), int(Fate.CHANNEL_BUSY)
 SENDER_DEAD, RECEIVER_DEAD, BLACKOUT = int(Fate.SENDER_DEAD), int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)
 ACKNOWLEDGED, TX_CHANNEL_BUSY = int(TxResult.ACKNOWLEDGED), int(TxResult.CHANNEL_BUSY)
 
+switch = tx_queue.switch
+
 BUFFER_IS_FULL = -1  # `run_until` returns it in place of a time
 MAX_EXTRA_ROWS = 64  # result rows of one event in addition to one per link of a frame
 

@@ -21,6 +21,8 @@ from swarmwire.comms.radio.model import RadioModel
 from swarmwire.comms.radio.phy import esb, jamming, mac, tx_queue
 from swarmwire.comms.radio.phy.event_queue import event_queue
 from swarmwire.comms.radio.phy.graph import RadioGraph
+from swarmwire.comms.radio.phy.ht import events
+from swarmwire.comms.radio.phy.ht.state import MPDU, idle_stations
 from swarmwire.comms.radio.phy.jamming import JammerTable
 from swarmwire.comms.radio.phy.link_table import LinkTable
 from swarmwire.comms.radio.phy.packets import PacketTable, append_results, final_statuses, frames_of
@@ -28,7 +30,7 @@ from swarmwire.comms.radio.phy.pairs import MeasuredLinks
 from swarmwire.comms.radio.phy.params import phy_params_of, thresholds_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams, propagation_params_of
 from swarmwire.comms.radio.phy.results import ResultBuffer, joined_rows, result_buffer
-from swarmwire.comms.radio.phy.state import IDLE, SILENT, PhyState, RadioSwitches, idle_receptions, idle_robots
+from swarmwire.comms.radio.phy.state import IDLE, PACKET, SILENT, PhyState, RadioSwitches, idle_receptions, idle_robots
 from swarmwire.comms.radio.stages.chain import after_reception, stages_after
 from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
 from swarmwire.comms.radio.stages.losses import LossChain
@@ -124,7 +126,11 @@ class SinrPhy(RadioModel):
         self._reports = Reporter(context, self._links, packets, links)
         self._events = event_queue(rows)
         self._robot, self._reception = idle_robots(rows), idle_receptions(rows)
-        self._packets, self._frames = PacketTable(rows), frames_of(context.radio)
+        # 802.11n has an event loop of its own; compiled functions depend on the types of these tables.
+        is_ht = self._params.ht is not None
+        self._mac: Any = events if is_ht else mac
+        self._ht = idle_stations(rows, context.robots) if is_ht else None
+        self._packets, self._frames = PacketTable(rows, MPDU if is_ht else PACKET), frames_of(context.radio)
         # Queues are set up again if packets are new; no event is due before `_next_ns`.
         self._order, self._start = np.empty(0, np.int64), np.zeros(rows + 1, np.int64)
         self._is_new, self._next_ns, self._buffer = True, 0, result_buffer(MIN_CAPACITY)
@@ -208,7 +214,7 @@ class SinrPhy(RadioModel):
             if parts:
                 buffer = result_buffer(capacity)
             if self._polling is None:
-                next_ns = mac.run_until(
+                next_ns = self._mac.run_until(
                     self._params, losses, state, self._events, buffer, max_links, until_ns, self._start, self._is_new
                 )
             else:
@@ -225,13 +231,13 @@ class SinrPhy(RadioModel):
     def disrupt(self, at_ns: int, disruption: Disruption, liveness: LivenessHistory) -> None:
         """End the queues of dead robots, suspend those of radios that are off, and end the receptions of both."""
         state = self._state(tx_queue.switches_of(disruption), at_ns)
-        mac.order_queues(state, self._events, self._start)
+        self._mac.order_queues(state, self._events, self._start)
         buffer = result_buffer(len(self._packets) + 1)
         if self._polling is not None:
             esb.end_exchanges(self._polling, state, self._events, buffer, at_ns)
-        mac.stop_dead(state, self._events, buffer, disruption.alive, at_ns)
-        mac.end_receptions(self._params, state, self._events, disruption.alive, disruption.radio_on, at_ns)
-        tx_queue.switch(self._params, state, self._events, buffer, at_ns)
+        self._mac.stop_dead(state, self._events, buffer, disruption.alive, at_ns)
+        self._mac.end_receptions(self._params, state, self._events, disruption.alive, disruption.radio_on, at_ns)
+        self._mac.switch(self._params, state, self._events, buffer, at_ns)
         if self._polling is not None:
             esb.resume(self._params, self._polling, state, self._events, buffer, at_ns)
         self._report([buffer], liveness)
@@ -279,6 +285,7 @@ class SinrPhy(RadioModel):
             self._order,
             switch,
             self._jam.between(self._now_ns, until_ns),
+            self._ht,
         )
 
     def _report(self, parts: list[ResultBuffer], liveness: LivenessHistory) -> None:

@@ -50,11 +50,11 @@ class PacketTable:
 
     Attributes:
         queued: the packets.
-        table: their state in the events, of dtype PACKET.
+        table: their state in the events, of dtype PACKET or, with 802.11n, MPDU.
     """
 
-    def __init__(self, rows: int) -> None:
-        self.queued, self.table = Transmissions(), np.zeros(0, PACKET)
+    def __init__(self, rows: int, kind: np.dtype[Any] = PACKET) -> None:
+        self.queued, self.table, self._kind = Transmissions(), np.zeros(0, kind), kind
         self._admission = Admission(rows, self.queued)
 
     def __len__(self) -> int:
@@ -75,7 +75,7 @@ class PacketTable:
         frames: "Frames",
     ) -> int:
         """Append sent packets; see `admit`."""
-        table: Table = np.zeros(len(self.table) + len(sent), PACKET)
+        table: Table = np.zeros(len(self.table) + len(sent), self._kind)
         table.view(np.uint8)[: self.table.nbytes] = self.table.view(np.uint8)  # much faster than by fields
         params = table, frames
         result = self._admission.accept(_accept, sent_at_ns, sent, others_alive, epoch, counts, params)
@@ -95,7 +95,7 @@ class PacketTable:
         """Remove and return all packets."""
         packets = self.queued.rows.copy()
         self.queued.used[:] = 0
-        self.table = np.zeros(0, PACKET)
+        self.table = np.zeros(0, self._kind)
         return packets
 
 

@@ -13,12 +13,14 @@ from swarmwire.comms.radio.config.frames import (
     broadcast_rate_bps,
     dcf_of,
     eifs_acknowledgement_ns,
+    range_rate_bps,
 )
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.phy.ht.params import HT_RATES_BPS, HtParams, ht_params_of
 from swarmwire.comms.radio.phy.link_table import Thresholds
-from swarmwire.comms.radio.phy.propagation import cut_off_dbm, receiver_for, sensitivity_of
-from swarmwire.comms.radio.phy.reception import log_success_table
+from swarmwire.comms.radio.phy.propagation import cut_off_dbm, sensitivity_of
+from swarmwire.comms.radio.phy.success import log_success_table
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sinr_for_db
 from swarmwire.comms.radio.timing import ESB, IEEE_802_15_4
@@ -69,11 +71,13 @@ class PhyParams(NamedTuple):
     data_rate: int
     broadcast_rate: int
     ack_rate: int
+    ht: HtParams | None  # only of radios of 802.11n
 
 
 def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     """Return the PHY parameters of a radio; each arena has `robots` robots."""
-    reception, access, receiver = radio.reception_or_default, radio.access_or_default, receiver_for(radio)
+    reception, access = radio.reception_or_default, radio.access_or_default
+    receiver = receiver_of(reception, radio.bit_rate_bps)
     csma, dcf = IEEE_802_15_4, dcf_of(radio)
     is_dcf, is_esb = access.method == "dcf", access.method == "esb"
     cca_threshold_dbm = access.cca_threshold_dbm
@@ -94,7 +98,9 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     dcf_timeout_ns = sifs_ns + ack_ns + dcf.slot_ns
     # The standard's value at its bit rate; longer where an acknowledgement at a lower bit rate takes longer.
     csma_timeout_ns = max(csma.ack_wait_ns, sifs_ns + ack_ns + csma.backoff_ns)
-    rates_bps = radio.bit_rate_bps, broadcast_rate_bps(radio), acknowledgement_rate_bps(radio)
+    is_ht = radio.frame == "802.11n"
+    ack_rate_bps, broadcast_bps = acknowledgement_rate_bps(radio), broadcast_rate_bps(radio)
+    rates_bps = HT_RATES_BPS if is_ht else (radio.bit_rate_bps, broadcast_bps, ack_rate_bps)
     max_bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
     return PhyParams(
         robots=robots,
@@ -129,9 +135,10 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         cw_max=dcf.cw_max,
         receiver=receiver,
         log_success=np.array([log_success_table(receiver_of(reception, rate_bps)) for rate_bps in rates_bps]),
-        data_rate=rates_bps.index(radio.bit_rate_bps),
-        broadcast_rate=rates_bps.index(broadcast_rate_bps(radio)),
-        ack_rate=rates_bps.index(acknowledgement_rate_bps(radio)),
+        data_rate=rates_bps.index(range_rate_bps(radio)),
+        broadcast_rate=rates_bps.index(broadcast_bps),
+        ack_rate=rates_bps.index(ack_rate_bps),
+        ht=ht_params_of(radio) if is_ht else None,
     )
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.radio.config.frames import range_rate_bps
 from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS, LossCurve
 from swarmwire.comms.radio.config.phy import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
@@ -30,8 +31,8 @@ DATA_SHEET_SENSITIVITY = {
 
 
 def receiver_for(radio: Radio) -> Receiver:
-    """Return the receiver of a radio."""
-    return receiver_of(radio.reception_or_default, radio.bit_rate_bps)
+    """Return the receiver of a radio, at the bit rate that reaches farthest."""
+    return receiver_of(radio.reception_or_default, range_rate_bps(radio))
 
 
 def sensitivity_of(radio: Radio) -> float:

@@ -9,80 +9,35 @@ interfere (access "none"), a receiver receives each frame as if it were alone.
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.draws_compiled import uniform
-from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.math import compiled as math_compiled
 from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.phy import dcf
 from swarmwire.comms.radio.phy.event_queue import OFF_AIR, schedule
+from swarmwire.comms.radio.phy.ht import decoding
 from swarmwire.comms.radio.phy.state import ACKNOWLEDGEMENT, DATA, RECEIVING, SILENT, TURNAROUND
-from swarmwire.comms.radio.propagation.decibels import from_db
-from swarmwire.comms.radio.reception.receiver import Model, Receiver, chunk_success
+from swarmwire.comms.radio.phy.success import alone_log_success, log_success
 from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
 from swarmwire.comms.radio.stages.losses import frame_fate
 from swarmwire.comms.robot.packets import Fate
-
-MIN_OCTAVE, MAX_OCTAVE, ROWS = -10, 12, 256
-MIN_SINR, MAX_SINR = 2.0**MIN_OCTAVE, 2.0**MAX_OCTAVE
-LOG_NEVER = -100.0  # log success of a bit that is always wrong
-CHUNK_BITS = 1000.0  # length at which the table evaluates success, for the digits of success close to 1
-THRESHOLD = int(Model.THRESHOLD)
-_FRACTION_BITS = np.int64(44)  # a double's fraction has 52 bits, of which the first 8 select the row
-_FRACTION = np.int64(2**44 - 1)
-_FIRST = np.int64((1023 + MIN_OCTAVE) * ROWS)
-
-
-def log_success_table(receiver: Receiver) -> FloatArray:
-    """Return the logarithm of a bit's success by SINR, (rows,), which the threshold model does not use.
-
-    Interference changes too often to evaluate a formula each time. The table has 256 rows per octave from 2^-10 to
-    2^12. The bits of the SINR select the row; with linear interpolation a frame's success is accurate to 1e-3.
-    """
-    octave = np.repeat(np.arange(MIN_OCTAVE, MAX_OCTAVE), ROWS)
-    sinr = np.append(2.0**octave * (1.0 + np.tile(np.arange(ROWS), MAX_OCTAVE - MIN_OCTAVE) / ROWS), MAX_SINR)
-    return _table(receiver, sinr)
-
-
-@kernel()
-def log_success(params, rate, sinr, bits):
-    """Return the logarithm of the probability of `bits` bits at this rate without error at this SINR, a ratio."""
-    table, receiver = params.log_success, params.receiver
-    if receiver.model == THRESHOLD:
-        return 0.0 if chunk_success(receiver, sinr, bits) > 0.0 else bits * LOG_NEVER
-    if sinr >= MAX_SINR:
-        return 0.0
-    sinr_bits = np.float64(max(sinr, MIN_SINR)).view(np.int64)
-    row = (sinr_bits >> _FRACTION_BITS) - _FIRST
-    share = (sinr_bits & _FRACTION) * (1.0 / (1 << 44))
-    return bits * (table[rate, row] + share * (table[rate, row + 1] - table[rate, row]))
-
-
-@njit()
-def _table(receiver, sinr):
-    out = np.empty(len(sinr))
-    for i in range(len(out)):
-        chunk, bit = chunk_success(receiver, sinr[i], CHUNK_BITS), chunk_success(receiver, sinr[i], 1.0)
-        if chunk > 0.1:
-            out[i] = math_compiled.log(chunk) / CHUNK_BITS
-        else:
-            out[i] = max(math_compiled.log(bit), LOG_NEVER) if bit > 0.0 else LOG_NEVER
-    return out
-
 
 RECEPTION, ACKNOWLEDGED = purpose("reception"), purpose("reception of an acknowledgement")
 RECEIVED, TOO_WEAK, COLLIDED, JAMMED = int(Fate.RECEIVED), int(Fate.TOO_WEAK), int(Fate.COLLIDED), int(Fate.JAMMED)
 
 
 @kernel()
-def fate_of_frame(params, losses, state, s, i, frame_log_success):
+def fate_of_frame(ht, params, losses, state, s, i, frame_log_success):
     """Return the fate on link i of the frame of robot s; `frame_log_success` is the log of its success.
 
     Draws are keyed by (sender, receiver, sequence) and attempt. The same draw decides the drop reason: COLLIDED if the
-    frame would have succeeded without interference, JAMMED if it would have succeeded without jammers alone.
+    frame would have succeeded without interference, JAMMED if it would have succeeded without jammers alone. `ht` is
+    `state.ht`.
     """
+    if ht is not None:
+        return decoding.fate_of_frame(params, losses, state, s, i)
     sender = state.robot[s]
     receiver = np.int64(state.link[i].receiver)
     key, a, b = state.keys[s // params.robots], s % params.robots, receiver % params.robots
@@ -105,31 +60,6 @@ def fate_of_frame(params, losses, state, s, i, frame_log_success):
         return COLLIDED if u < alone else TOO_WEAK
     frame = ReceivedFrame(key, s, receiver, a, b, sequence, attempt, is_ack, sender.on_air_ns, losses.trace_ns)
     return frame_fate(losses, frame)
-
-
-@kernel()
-def alone_log_success(params, power_mw, bits, rate):
-    """Return the logarithm of a frame's success probability without interference."""
-    if power_mw < params.min_preamble_mw or power_mw < params.min_preamble_sinr * params.noise_mw:
-        return bits * LOG_NEVER
-    if power_mw >= params.error_free_sinr * params.noise_mw:
-        return 0.0
-    return log_success(params, rate, power_mw / params.noise_mw, bits)
-
-
-@kernel(from_python=True)
-def lone_delivery(params, mean_dbm, bits):
-    """Return the success probability of a lone frame of `bits` bits at this power."""
-    return math_compiled.exp(alone_log_success(params, from_db(mean_dbm), bits, params.data_rate))
-
-
-@njit()
-def lone_deliveries(params, mean_dbm, bits):
-    """Return `lone_delivery` at several powers, (k,)."""
-    delivery = np.empty(len(mean_dbm))
-    for i in range(len(delivery)):
-        delivery[i] = lone_delivery(params, mean_dbm[i], bits)
-    return delivery
 
 
 @kernel()
@@ -163,13 +93,13 @@ def start_frame(params, state, events, s, now_ns, airtime_ns, bits):
             continue
         r = np.int64(link[i].receiver)
         rx = reception[np.uint64(r)]
-        end_chunk(params, robot, rx, now_ns)
+        end_chunk(state.ht, params, robot, rx, r, now_ns)
         _arrive(params, robot, rx, link, s, i, now_ns)
         dcf.sense(params, state, events, r, now_ns)
     for i in range(weak, stop):
         r = np.int64(link[i].receiver)
         rx = reception[np.uint64(r)]
-        end_chunk(params, robot, rx, now_ns)
+        end_chunk(state.ht, params, robot, rx, r, now_ns)
         _add(rx, link[i].power_mw)
         dcf.sense(params, state, events, r, now_ns)
 
@@ -183,7 +113,7 @@ def end_frame(params, losses, state, events, s, now_ns):
         for i in range(sender.first_link, sender.weak_link):
             if link[i].frame_fate == RECEIVING:
                 alone = alone_log_success(params, link[i].power_mw, sender.bits, sender.rate)
-                link[i].frame_fate = fate_of_frame(params, losses, state, s, i, alone)
+                link[i].frame_fate = fate_of_frame(state.ht, params, losses, state, s, i, alone)
         sender.on_air = SILENT
         return
     # Without other losses, a data frame of success 1 is received.
@@ -194,20 +124,20 @@ def end_frame(params, losses, state, events, s, now_ns):
             continue
         r = np.int64(link[i].receiver)
         rx = reception[np.uint64(r)]
-        end_chunk(params, robot, rx, now_ns)
+        end_chunk(state.ht, params, robot, rx, r, now_ns)
         _remove(rx, link[i].power_mw)
         if (rx.locked_to == s) & (rx.link == np.int64(i)):
             unlock(rx)
             if is_sure and rx.log_success == 0.0:  # without a draw; pragma: no mutate (the fate is the same)
                 link[i].frame_fate = RECEIVED
             else:
-                link[i].frame_fate = fate_of_frame(params, losses, state, s, np.int64(i), rx.log_success)
+                link[i].frame_fate = fate_of_frame(state.ht, params, losses, state, s, np.int64(i), rx.log_success)
             dcf.reception_ended(params, robot, r, s, link[i].frame_fate == RECEIVED, now_ns)
         dcf.sense(params, state, events, r, now_ns)
     for i in range(weak, stop):
         r = np.int64(link[i].receiver)
         rx = reception[np.uint64(r)]
-        end_chunk(params, robot, rx, now_ns)
+        end_chunk(state.ht, params, robot, rx, r, now_ns)
         _remove(rx, link[i].power_mw)
         dcf.sense(params, state, events, r, now_ns)
     sender.on_air = SILENT
@@ -272,12 +202,17 @@ def _arrive(params, robot, rx, link, s, i, now_ns):
         rx.log_success = rx.jam_log = 0.0
 
 
-@kernel(inline="always")
-def end_chunk(params, robot, rx, now_ns):
-    """Add the log success of the current chunk, before the interference at a robot changes."""
+@kernel()  # not inlined by numba, which then drops branches by the type of `ht`
+def end_chunk(ht, params, robot, rx, r, now_ns):
+    """Add the log success of the current chunk, before the interference at robot r changes; `ht` is `state.ht`."""
     # The signal of idle receivers is infinite: a branch for them would be mispredicted too often.
     others_mw = max(rx.power_mw - rx.signal_mw, 0.0) * (rx.signals > 1)
     noise_mw = params.noise_mw + rx.jam_mw + others_mw
+    if ht is not None:
+        if rx.signal_mw < params.error_free_sinr * noise_mw:
+            decoding.add_chunk(ht, rx, r, now_ns, rx.signal_mw / noise_mw, rx.signal_mw / (params.noise_mw + others_mw))
+        rx.since_ns = now_ns
+        return
     if (rx.signal_mw < params.error_free_sinr * noise_mw) & (rx.log_success > LOG_HOPELESS):
         sender = robot[rx.locked_to]
         bits = sender.bits * ((now_ns - rx.since_ns) / sender.airtime_ns)

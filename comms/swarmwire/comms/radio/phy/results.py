@@ -52,7 +52,7 @@ def record_at_sender(state, buffer, index, fate, now_ns):
     """Record the fate of a packet that ends at its sender's radio."""
     packet = state.packet[index]
     packet.is_done, packet.fate, packet.on_air_at_ns = 1, fate, now_ns
-    _record(state, buffer, index, NO_ROBOT, fate, 0, now_ns, 0, 0.0)
+    record(state, buffer, index, NO_ROBOT, fate, 0, now_ns, 0, 0.0)
 
 
 @kernel()
@@ -79,7 +79,7 @@ def record_frame(params, state, events, buffer, r, now_ns):
     robot.last_fate, robot.last_in_range, robot.last_mw = NO_FATE, 0, 0.0
     link, to, pose_id, index = state.link, packet.to, robot.pose_id, robot.packet
     if to == BROADCAST:
-        _record_broadcast(state, buffer, r, now_ns)
+        record_broadcast(state, buffer, r, now_ns)
         return
     for i in range(robot.first_link, robot.weak_link):
         receiver, fate, power_mw = np.int64(link[i].receiver), np.int64(link[i].frame_fate), link[i].power_mw
@@ -90,14 +90,15 @@ def record_frame(params, state, events, buffer, r, now_ns):
         if fate == RECEIVED:
             if not packet.is_settled:
                 packet.is_settled = 1
-                _record(state, buffer, index, receiver, RECEIVED, 1, now_ns, pose_id, power_mw)
+                record(state, buffer, index, receiver, RECEIVED, 1, now_ns, pose_id, power_mw)
             if params.acknowledged:
                 state.robot[receiver].ack_to = r
                 schedule(events, SEND_ACK, receiver, now_ns + params.sifs_ns)
 
 
 @kernel()
-def _record_broadcast(state, buffer, r, now_ns):
+def record_broadcast(state, buffer, r, now_ns):
+    """Record a broadcast's fate at each robot in range, and at robots out of range that received it."""
     robot, link = state.robot[r], state.link
     on_air_at_ns, k = state.packet[robot.packet].on_air_at_ns, np.uint64(buffer.count[0])
     for i in range(np.uint64(robot.first_link), np.uint64(robot.weak_link)):
@@ -119,7 +120,7 @@ def record_last_attempt(state, buffer, r, now_ns):
     packet.is_done = 1
     if not packet.is_settled and robot.last_fate != NO_FATE:
         packet.is_settled = 1
-        _record(
+        record(
             state,
             buffer,
             robot.packet,
@@ -133,7 +134,8 @@ def record_last_attempt(state, buffer, r, now_ns):
 
 
 @kernel()
-def _record(state, buffer, packet, receiver, fate, in_range, final_at_ns, pose_id, power_mw):
+def record(state, buffer, packet, receiver, fate, in_range, final_at_ns, pose_id, power_mw):
+    """Append a row."""
     k = buffer.count[0]
     buffer.packet[k], buffer.receiver[k], buffer.fate[k], buffer.in_range[k] = packet, receiver, fate, in_range
     buffer.final_at_ns[k], buffer.pose_id[k], buffer.power_mw[k] = final_at_ns, pose_id, power_mw

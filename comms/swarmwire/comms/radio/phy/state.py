@@ -2,7 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -146,6 +146,7 @@ class PhyState(NamedTuple):
     order: IntArray  # rows of packets by sender, in the order of sending
     switch: RadioSwitches
     jam: JammerSchedule
+    ht: tuple[Any, ...] | None  # `HtState` of radios of 802.11n
 
 
 def idle_robots(rows: int) -> Table:

@@ -9,7 +9,7 @@ import pytest
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.phy.params import phy_params_of
-from swarmwire.comms.radio.phy.reception import lone_deliveries
+from swarmwire.comms.radio.phy.success import lone_deliveries
 from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
 from tests.support.comms.radio import (
     METHODS,

@@ -1,0 +1,171 @@
+"""Frame exchanges of IEEE 802.11n: A-MPDU, block acknowledgements, retries, order, RTS, CTS and NAV."""
+
+from collections import Counter
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.radio.config.radio import Radio, check_radio
+from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
+from tests.support.comms.radio import TICK_NS, Run, at, living, make_medium, packets, run, run_disrupted
+from tests.unit.world.scenario.test_bodies import radio_of
+
+PAIR, FAR_THIRD = at((0, 0), (1, 0)), at((0, 0), (1, 0), (900, 0))
+AIFS, SIFS, SLOT = 43, 16, 9  # us, at 5 GHz
+RTS, CTS, BLOCK_ACK = 52, 44, 32  # us: 20 and 14 bytes at 6 Mbit/s, 32 at 24
+
+
+def radio_n(access: dict[str, Any] | None = None, **others: Any) -> Radio:
+    """A radio at 65 Mbit/s, with 38 bytes of headers."""
+    return radio_of(
+        {"preset": "wifi-n-5G", "overhead_bytes": 38, "send_offset": "tick", "access": access or {}, **others}
+    )
+
+
+def ht_us(octets: int, symbol_bits: int = 260) -> int:
+    """Airtime of a PSDU: preamble, service and tail bits, symbols (802.11n-2009, 20.4.3)."""
+    return 36 + 4 * -(-(22 + 8 * octets) // symbol_bits)
+
+
+def received_us(result: Run, sender: int = 0) -> list[int]:
+    is_sender = result.received("sender_index") == sender
+    return (result.received("received_at_ns")[is_sender] // 1000).tolist()
+
+
+def burst(size: int, count: int, sender: int = 0, to: int = 1) -> SentPackets:
+    return packets([sender] * count, to, size)
+
+
+def at_start(sent: SentPackets, later: SentPackets | None = None) -> Any:
+    return lambda tick: sent if tick == 0 else later or packets([])
+
+
+def test_ampdu_of_six_packets_is_received_at_its_end():
+    """Subframes of 4 + 1510 bytes, all but the last padded to 1516: 9094 bytes."""
+    result = run(make_medium(radio_n(), 2), PAIR, at_start(burst(1472, 6)), 1, 3)
+    assert ht_us(9094) == 1156
+    assert received_us(result) == [AIFS + 1156] * 6
+
+
+@pytest.mark.parametrize(
+    ("access", "size", "counts"),
+    [
+        # 29 subframes of 1516 bytes take 5448 us, and 30 more than 5484; 64 is the window of a block acknowledgement.
+        ({}, 1472, [29, 29, 12]),
+        ({}, 100, [64, 6]),
+        ({"aggregation_bytes": 4000}, 1472, [2] * 35),
+        ({"aggregation_bytes": 0}, 1472, [1] * 70),
+    ],
+)
+def test_ampdu_has_limits_of_time_window_and_size(access: dict[str, Any], size: int, counts: list[int]):
+    result = run(make_medium(radio_n(access), 2), PAIR, at_start(burst(size, 70)), 1, 3)
+    assert list(Counter(received_us(result)).values()) == counts
+
+
+def test_ampdus_follow_after_block_acknowledgement_aifs_and_backoff():
+    result = run(make_medium(radio_n(), 2), PAIR, at_start(burst(1472, 290)), 1, 3)
+    ends = np.unique(received_us(result))
+    slots = (np.diff(ends) - (SIFS + BLOCK_ACK + AIFS + 5448)) / SLOT
+    assert len(ends) == 10
+    assert (slots == slots.round()).all()
+    assert slots.min() >= 0
+    assert 0 < slots.max() <= 15
+
+
+@pytest.mark.parametrize(("threshold", "is_reserved"), [(138, False), (137, True)])
+def test_rts_and_cts_precede_frames_beyond_the_threshold(threshold: int, is_reserved: bool):
+    """A packet of 100 bytes makes a frame of 138."""
+    radio = radio_n({"rts_threshold_bytes": threshold})
+    result = run(make_medium(radio, 2), PAIR, at_start(burst(100, 1)), 1, 3)
+    reservation = RTS + SIFS + CTS + SIFS if is_reserved else 0
+    assert received_us(result) == [AIFS + reservation + ht_us(138)]
+
+
+def exact(loss: float, seed: int = 3) -> Run:
+    sent = replace(burst(200, 60), tx_status_id=np.arange(60))
+    radio = radio_n(loss=loss, queue_lifetime_s=10.0, bit_rate_bps=13_000_000)
+    return run(make_medium(radio, 2, [seed]), PAIR, at_start(sent), 1, 8)
+
+
+def test_lost_packets_of_an_ampdu_are_sent_again_and_received_in_order():
+    """Each packet, and each block acknowledgement, is lost with 0.3; every packet arrives, once."""
+    result = exact(0.3)
+    sequence, at_ns = result.received("sequence"), result.received("received_at_ns")
+    assert sequence[np.argsort(at_ns, kind="stable")].tolist() == list(range(60))
+    assert len(np.unique(at_ns)) > 2
+    results = np.concatenate([step.tx_status.result for step in result.news])
+    assert results.tolist() == [int(TxResult.ACKNOWLEDGED)] * 60
+
+
+def test_packets_of_an_ampdu_are_lost_independently():
+    """Of 60 packets in one frame, 60 x 0.7 +- 3 deviations arrive; those behind the first lost one wait for it."""
+    seeds = range(20)
+    medium = make_medium(radio_n({"max_retries": 0}, loss=0.3), 2, seeds)
+    sent = packets([2 * seed for seed in seeds for _ in range(60)], 1, 50)
+    result = run(medium, np.tile(PAIR, (20, 1)), at_start(sent), 1, 8)
+    mean = result.tally.fates[:, Fate.RECEIVED].mean() / 60.0
+    assert abs(mean - 0.7) < 3.0 * np.sqrt(0.3 * 0.7 / 1200.0)
+    assert len(np.unique(result.tally.fates[:, Fate.RECEIVED])) > 3
+
+
+def test_packet_to_a_robot_out_of_reach_is_retried_until_its_lifetime_ends():
+    sent = replace(burst(100, 1), tx_status_id=np.array([7]))
+    result = run(make_medium(radio_n(), 2), at((0, 0), (900, 0)), at_start(sent), 1, 9)
+    ended = [tick for tick, step in enumerate(result.news) if len(step.tx_status)]
+    assert ended == [6]  # 0.5 s, then the next access
+    assert result.fates() == {"OUT_OF_RANGE": 1}
+
+
+def hidden(access: dict[str, Any]) -> Run:
+    """Two stations that do not hear one another fill the queue with packets to one between them, at 6.5 Mbit/s."""
+    radio = radio_n({"aggregation_bytes": 0, **access}, bit_rate_bps=6_500_000)
+    pose = at((-41, 0), (0, 0), (41, 0))
+    return run(make_medium(radio, 3), pose, lambda _: packets([0, 2] * 60, 1, 1400), 4)
+
+
+def test_rts_and_cts_protect_hidden_stations_from_one_another():
+    """A packet takes 1.8 ms; without reservation frames of hidden stations overlap most of the time."""
+    bare, reserved = (len(hidden(access).received("sequence")) for access in ({}, {"rts_threshold_bytes": 0}))
+    assert reserved > 0.75 * 0.3e6 / 1800
+    assert bare < 0.6 * reserved
+
+
+def test_nav_of_an_unanswered_rts_is_reset():
+    """A station that decodes an RTS, but neither CTS nor data, waits for 2 SIFS, CTS, 20 us and 2 slots, then AIFS.
+
+    The RTS announces a frame of 20 packets, which would take 3.5 ms.
+    """
+    medium = make_medium(radio_n({"rts_threshold_bytes": 1000}), 3)
+    result = Run(medium, [medium.step(0, FAR_THIRD)])
+    medium.send_at(np.zeros(20, np.int64), burst(1400, 20, 0, 2))
+    medium.send_at(np.array([60_000]), burst(50, 1, 1, 0))
+    result.news.append(medium.step(TICK_NS, FAR_THIRD))
+    reset = 2 * SIFS + CTS + 20 + 2 * SLOT
+    (at_us,) = received_us(result, 1)
+    assert AIFS + RTS + reset + AIFS + ht_us(88) <= at_us < 3000
+
+
+def test_frame_of_a_sender_that_dies_is_received_but_its_queue_ends():
+    sent = {0: burst(1400, 300)}
+    dead = {1: living([False, True])}
+    result = run_disrupted(make_medium(radio_n(bit_rate_bps=6_500_000), 2), PAIR, sent, dead, 4)
+    fates = result.fates()
+    assert fates["RECEIVED"] + fates["SENDER_DEAD"] == 300
+    assert max(received_us(result)) > 100_000  # the frame on air
+
+
+@pytest.mark.parametrize("key", ["aggregation_bytes", "rts_threshold_bytes"])
+def test_keys_of_802_11n_are_refused_with_other_frames(key: str):
+    with pytest.raises(BadInput) as error:
+        radio_of({"preset": "wifi-a-6M", "access": {key: 100}})
+    assert error.value.key == f"radio.access.{key}"
+
+
+def test_802_11n_requires_dcf():
+    radio = radio_n()
+    with pytest.raises(BadInput) as error:
+        check_radio(replace(radio, access=replace(radio.access_or_default, method="aloha")), "a.toml")
+    assert error.value.key == "radio.access.method"
