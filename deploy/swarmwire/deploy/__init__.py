@@ -1,6 +1,7 @@
 """Execution of scenarios, from Python and from the command line.
 
-`run` a scenario, step a `Simulation`, `repeat` a run; `sweep` a campaign of many runs, and `resume` it.
+`run` a scenario, step a `Simulation`, `repeat` a run; `sweep` a campaign of many runs, and `resume` it; check the
+results by `expect`.
 """
 
 from importlib import import_module
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from swarmwire.deploy.machine import keep_kernels
 
 if TYPE_CHECKING:
+    from swarmwire.deploy.campaigns.expecting import NotMet, expect
     from swarmwire.deploy.campaigns.repetition import Repetition, repeat
     from swarmwire.deploy.campaigns.sweep import Sweep, resume, sweep
     from swarmwire.deploy.runs.config import Listening, Recording, RunConfig
@@ -16,12 +18,14 @@ if TYPE_CHECKING:
     from swarmwire.deploy.runs.record.provenance import RunFacts
     from swarmwire.deploy.runs.result import ArenaResult, Percentiles, RadioResult, Result, Statistics
     from swarmwire.deploy.runs.simulation import Simulation, run
+    from swarmwire.metrics.records.campaign.expectations import Verdict
     from swarmwire.metrics.records.run_folder.reader import RunFolder
 
 __all__ = [
     "ArenaResult",
     "Gateways",
     "Listening",
+    "NotMet",
     "Percentiles",
     "RadioResult",
     "Recording",
@@ -33,6 +37,8 @@ __all__ = [
     "Simulation",
     "Statistics",
     "Sweep",
+    "Verdict",
+    "expect",
     "repeat",
     "resume",
     "run",
@@ -42,6 +48,7 @@ __all__ = [
 _MODULES = {
     "Gateways": "swarmwire.deploy.runs.gateways.gateways",
     "Listening": "swarmwire.deploy.runs.config",
+    "NotMet": "swarmwire.deploy.campaigns.expecting",
     "Recording": "swarmwire.deploy.runs.config",
     "Repetition": "swarmwire.deploy.campaigns.repetition",
     "RunConfig": "swarmwire.deploy.runs.config",
@@ -49,6 +56,8 @@ _MODULES = {
     "RunFolder": "swarmwire.metrics.records.run_folder.reader",
     "Simulation": "swarmwire.deploy.runs.simulation",
     "Sweep": "swarmwire.deploy.campaigns.sweep",
+    "Verdict": "swarmwire.metrics.records.campaign.expectations",
+    "expect": "swarmwire.deploy.campaigns.expecting",
     "repeat": "swarmwire.deploy.campaigns.repetition",
     "resume": "swarmwire.deploy.campaigns.sweep",
     "run": "swarmwire.deploy.runs.simulation",

@@ -90,7 +90,7 @@ def test_new_project_checks_and_runs_as_it_is(made, tmp_path, monkeypatch, capsy
 def test_new_projects_own_test_passes_as_it_is(made):
     ended = own_tests(made)
     assert ended.returncode == 0, ended.stdout
-    assert "3 passed" in ended.stdout
+    assert "4 passed" in ended.stdout
 
 
 def test_new_projects_own_test_fails_if_the_agent_neither_drives_nor_sends(tmp_path, monkeypatch):

@@ -22,6 +22,7 @@ SwarmwireError
     ├── NotWanted       no process waits for this task any more: it is not begun
     ├── StorageFailed   a campaign's folder cannot be written: finished trials stay
     ├── NothingFound    every trial of a tuning failed
+    ├── NotMet          a run or a campaign does not meet an expectation; also an AssertionError
     └── HostFailed      a computer of the fleet cannot be reached, or a request to it failed
 """
 

@@ -38,8 +38,7 @@ def write_junit(folder: str, checked: Sequence[Verdict], file: Path) -> None:
     failures = str(sum(not each.is_met for each in checked))
     suite = ET.Element("testsuite", name=folder, tests=str(len(checked)), failures=failures)
     for each in checked:
-        name = f"{each.expectation.text} at {each.at}" if each.at else each.expectation.text
-        case = ET.SubElement(suite, "testcase", classname="swarmwire.expect", name=name)
+        case = ET.SubElement(suite, "testcase", classname="swarmwire.expect", name=each.title)
         if not each.is_met:
             ET.SubElement(case, "failure", message=f"measured {each.measured}")
     with output_file(file) as temporary:

@@ -68,6 +68,11 @@ class Verdict(NamedTuple):
     is_met: bool
     measured: str  #: what was measured, for people
 
+    @property
+    def title(self) -> str:
+        """The expectation and its design point."""
+        return f"{self.expectation.text} at {self.at}" if self.at else self.expectation.text
+
 
 def parse_expectation(text: str) -> Expectation:
     """Parse `NAME >= NUMBER`, also with `in 80 % of runs`; BadInput for any other text."""
@@ -151,17 +156,24 @@ def _verdict(expectation: Expectation, at: str, sample: Sample, stat: Stat) -> V
 
 
 def _run_verdicts(run: RunFolder, expectations: Sequence[Expectation]) -> list[Verdict]:
-    """Return the verdicts on a run; several arenas are runs of one sample."""
     content = run.summary
     if content is None:
         raise BadInput(str(run.path), "", "expected a run that has ended: it has no summary")
+    return summary_verdicts(content, expectations, str(run.path))
+
+
+def summary_verdicts(content: dict[str, Any], expectations: Sequence[Expectation], where: str) -> list[Verdict]:
+    """Return the verdicts on a run by its summary; several arenas are runs of one sample.
+
+    BadInput, with `where`, for a name without values.
+    """
     values = _run_values(content)
     rows: list[Verdict] = []
     for expectation in expectations:
         name = expectation.name if expectation.name in values else expectation.name + FINAL
         if name not in values and not name.startswith(COUNTS):
             names = [column.removesuffix(FINAL) for column in values if column.endswith(FINAL) or column in USUAL]
-            raise BadInput(str(run.path), expectation.name, f"expected {did_you_mean(names, expectation.name)}")
+            raise BadInput(where, expectation.name, f"expected {did_you_mean(names, expectation.name)}")
         unfaulted: FloatArray = np.zeros(len(content["by_arena"]))
         numbers = values.get(name, unfaulted)
         if content["ended"] in ("failed", "interrupted"):
