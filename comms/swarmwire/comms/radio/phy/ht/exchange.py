@@ -62,7 +62,7 @@ def send(params, state, events, buffer, r, now_ns):
             begin(params, state, events, r, now_ns)
             return
         robot.packet = state.order[first]
-        if station.request_to != NO_ROBOT and _is_any_unanswered(state, r, station.request_to):
+        if station.request_to != NO_ROBOT and _is_any_waiting(state, r, station.request_to):
             rate = ht.control_rate[station.rate]
             station.to, station.awaits, robot.mac_state = station.request_to, BLOCK_ACK, SENDING
             duration_ns = params.sifs_ns + frame_ns(ht, rate, BLOCK_ACK_BYTES)
@@ -94,12 +94,12 @@ def send(params, state, events, buffer, r, now_ns):
 
 
 @kernel()
-def _is_any_unanswered(state, r, to):
-    """Return True if robot r does not know whether a packet that was on air has reached robot `to`."""
+def _is_any_waiting(state, r, to):
+    """Return True if a packet of robot r to robot `to` waits for a frame or its acknowledgement."""
     robot = state.robot[r]
     for k in range(robot.next, robot.enqueue_next):
         packet = state.packet[state.order[k]]
-        if packet.to == to and packet.attempts > 0 and not (packet.is_done or packet.is_acked):
+        if packet.to == to and not (packet.is_done or packet.is_acked):
             return True
     return False
 

@@ -53,9 +53,10 @@ def ht_params_of(radio: Radio) -> HtParams:
     symbol_bits = [*HT_BITS_PER_SYMBOL.values(), *(OFDM_BITS_PER_SYMBOL[rate_bps] for rate_bps in OFDM_MANDATORY_BPS)]
     control = [max(rate for rate in OFDM_MANDATORY_BPS if rate <= mcs_bps) for mcs_bps in HT_BITS_PER_SYMBOL]
     cts_ns = OFDM_PREAMBLE_NS - (-(22 + 8 * CTS_BYTES) // symbol_bits[BASIC_RATE]) * SYMBOL_NS + extension_ns
-    attempts = NO_LIMIT if access.max_retries is None else 1 + access.max_retries
-    if radio.queue_lifetime_s is None and access.max_retries is None:
-        attempts = 1 + dcf.max_retries
+    max_ampdu_bytes = MAX_AMPDU_BYTES if access.aggregation_bytes is None else access.aggregation_bytes
+    attempts = 1 + (dcf.max_retries if access.max_retries is None else access.max_retries)
+    if access.max_retries is None and radio.queue_lifetime_s is not None and max_ampdu_bytes > 0:
+        attempts = NO_LIMIT
     receivers = (receiver_of(radio.reception_or_default, rate_bps) for rate_bps in HT_BITS_PER_SYMBOL)
     return HtParams(
         preamble_ns=np.array([HT_PREAMBLE_NS] * MCS + [OFDM_PREAMBLE_NS] * len(OFDM_MANDATORY_BPS)),
@@ -64,7 +65,7 @@ def ht_params_of(radio: Radio) -> HtParams:
         extension_ns=extension_ns,
         wait_ns=dcf.sifs_ns + dcf.slot_ns + OFDM_PREAMBLE_NS,
         nav_reset_ns=2 * dcf.sifs_ns + cts_ns + OFDM_PREAMBLE_NS + 2 * dcf.slot_ns,
-        max_ampdu_bytes=MAX_AMPDU_BYTES if access.aggregation_bytes is None else access.aggregation_bytes,
+        max_ampdu_bytes=max_ampdu_bytes,
         rts_threshold_bytes=NEVER_BYTES if access.rts_threshold_bytes is None else access.rts_threshold_bytes,
         max_attempts=attempts,
         rate_control=RATE_CONTROLS.index(access.rate_control),

@@ -162,8 +162,12 @@ def drop_finished(params, state, buffer, r, now_ns):
             if packet.attempts == 0:
                 packet.result = TX_QUEUE_FULL
             end_packet(state, buffer, r, index, QUEUE_FULL, now_ns)
-            if packet.to >= 0:
+            if packet.to >= 0 and packet.attempts > 0:
                 pass_on(state, buffer, r, packet.to, now_ns)
+                if params.ht.max_ampdu_bytes > 0:  # moves the receiver's window
+                    state.ht.station[r].request_to = packet.to
+                if not is_late:
+                    state.ht.peer[r, packet.to % params.robots].sinr = 0.0
         elif packet.attempts == 0:
             break
 
