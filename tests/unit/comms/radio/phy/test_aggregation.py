@@ -47,7 +47,10 @@ def test_ampdu_of_six_packets_is_received_at_its_end():
     """Subframes of 4 + 1510 bytes, all but the last padded to 1516: 9094 bytes."""
     result = run(make_medium(radio_n(), 2), PAIR, at_start(burst(1472, 6)), 1, 3)
     assert ht_us(9094) == 1156
-    assert received_us(result) == [AIFS + 1156] * 6
+    at_us = received_us(result)
+    assert len(at_us) == 6
+    assert at_us == [at_us[0]] * 6
+    assert 1156 <= at_us[0] < SLOT + 1156  # an idle medium is free from the next slot on
 
 
 @pytest.mark.parametrize(
@@ -81,7 +84,8 @@ def test_rts_and_cts_precede_frames_beyond_the_threshold(threshold: int, is_rese
     radio = radio_n({"rts_threshold_bytes": threshold})
     result = run(make_medium(radio, 2), PAIR, at_start(burst(100, 1)), 1, 3)
     reservation = RTS + SIFS + CTS + SIFS if is_reserved else 0
-    assert received_us(result) == [AIFS + reservation + ht_us(138)]
+    (at_us,) = received_us(result)
+    assert 0 <= at_us - (reservation + ht_us(138)) < SLOT
 
 
 def exact(loss: float, seed: int = 3) -> Run:
@@ -165,11 +169,11 @@ def test_nav_of_an_unanswered_rts_is_reset():
     medium = make_medium(radio_n({"rts_threshold_bytes": 1000}), 3)
     result = Run(medium, [medium.step(0, FAR_THIRD)])
     medium.send_at(np.zeros(20, np.int64), burst(1400, 20, 0, 2))
-    medium.send_at(np.array([60_000]), burst(50, 1, 1, 0))
+    medium.send_at(np.array([30_000]), burst(50, 1, 1, 0))  # during the RTS
     result.news.append(medium.step(TICK_NS, FAR_THIRD))
     reset = 2 * SIFS + CTS + 20 + 2 * SLOT
     (at_us,) = received_us(result, 1)
-    assert AIFS + RTS + reset + AIFS + ht_us(88) <= at_us < 3000
+    assert RTS + reset + AIFS + ht_us(88) <= at_us < 3000
 
 
 def test_frame_of_a_sender_that_dies_is_received_but_its_queue_ends():

@@ -6,11 +6,11 @@ from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import ABSENT, NO_PACKET, NO_ROBOT
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST
 from swarmwire.comms.radio.phy import dcf, mac, reception, results
-from swarmwire.comms.radio.phy.event_queue import ENQUEUE, schedule
+from swarmwire.comms.radio.phy.event_queue import ENQUEUE, SEND, schedule
 from swarmwire.comms.radio.phy.ht import ppdu
 from swarmwire.comms.radio.phy.ht.params import frame_ns
 from swarmwire.comms.radio.phy.ht.state import BLOCK_ACK, CTS
-from swarmwire.comms.radio.phy.state import ACKNOWLEDGEMENT, IDLE, SUSPENDED
+from swarmwire.comms.radio.phy.state import ACKNOWLEDGEMENT, BACKING_OFF, IDLE, SUSPENDED
 from swarmwire.comms.robot.packets import Fate, TxResult
 
 TOO_LARGE, QUEUE_FULL, TX_QUEUE_FULL = int(Fate.TOO_LARGE), int(Fate.QUEUE_FULL), int(TxResult.QUEUE_FULL)
@@ -30,7 +30,23 @@ def begin(params, state, events, r, now_ns):
     if state.switch.backlog[r] != DROP:
         robot.mac_state = SUSPENDED
     else:
-        dcf.request_access(params, state, events, r, now_ns)
+        request_access(params, state, events, r, now_ns)
+
+
+@kernel()
+def request_access(params, state, events, r, now_ns):
+    """Start channel access for the next exchange: at once if the backoff has ended, at the boundary of a slot.
+
+    DCF waits for DIFS in this case; the EDCA of ns-3 does not, as the standard allows (IEEE 802.11-2020, 10.23.2.4).
+    """
+    robot = state.robot[r]
+    robot.mac_state = BACKING_OFF
+    if state.reception[r].is_busy:
+        return
+    counted_ns = robot.free_from_ns + params.difs_ns + robot.backoff_slots * params.slot_ns
+    if counted_ns < now_ns:
+        counted_ns += -(-(now_ns - counted_ns) // params.slot_ns) * params.slot_ns
+    schedule(events, SEND, r, counted_ns)
 
 
 @kernel()
