@@ -139,7 +139,7 @@ def test_rts_and_cts_protect_hidden_stations_from_one_another():
 
 def bianchi_mbps(stations: int, frame_us: int, response_us: int, payload_bytes: int) -> float:
     """Throughput of stations that always send (G. Bianchi, IEEE JSAC 18, 2000): CWmin 15, six doublings."""
-    low, high = 0.0, 1.0
+    low, high, tau = 0.0, 1.0, 0.5
     for _ in range(60):
         tau = 0.5 * (low + high)
         p = 1.0 - (1.0 - tau) ** (stations - 1)
