@@ -9,21 +9,24 @@ import numpy as np
 
 from benchmarks.ns3.comparison import THROUGHPUT, figures_of
 from benchmarks.ns3.configurations import Configuration
+from benchmarks.ns3.lorasim import extraction
 from benchmarks.ns3.simulators import ours
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
+from swarmwire.comms.radio.phy.propagation import sensitivity_of
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.error_rates import oqpsk_bit_errors
-from swarmwire.comms.radio.timing import IEEE_802_11A, ieee80211a_ns, ieee80211b_ns, ieee80211g_ns
+from swarmwire.comms.radio.timing import IEEE_802_11A, ieee80211a_ns, ieee80211b_ns, ieee80211g_ns, lora_ns
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 from swarmwire.deploy.runs.scenario_parts import radio_of
 
 LIMIT = 0.03  # of a ratio to the stated figure, where it is a simulation's
 EXACT = 1e-4
+LORA_FRAMES, DER_LIMIT = 4000, 0.02
 SENDERS, FRAME_BYTES, RATE_HZ, TICKS = 200, 30, 10, 300  # of ALOHA
 ROBOTS, SIDE_M = 200, 12.0  # of ARGoS's rule
 DRONES, ESB_OCTETS = 9, 32  # of polling
@@ -40,6 +43,7 @@ def closed_forms() -> list[str]:
         *_bianchi(),
         *_esb(),
         _argos(),
+        *_lora(),
     ]:
         verdict = "within" if abs(simulated / stated - 1.0) <= limit else "**miss**"
         lines.append(f"| {quantity} | {source} | {stated:.5g} | {simulated:.5g} | {verdict} |")
@@ -67,6 +71,20 @@ def _airtimes() -> Iterator[Line]:
     yield "802.11b, 1024 octets at 1M, µs", source, 8384, _us(ieee80211b_ns(1024, 1_000_000, short_preamble=False)), 0
     yield "802.11a, 1536 octets at 54M, µs", source, 248, _us(ieee80211a_ns(1536, 54_000_000)), 0
     yield "802.11g, 1536 octets at 54M, µs", source, 254, _us(ieee80211g_ns(1536, 54_000_000)), 0
+
+
+def _lora() -> Iterator[Line]:
+    sheet, limit_db = "Semtech, AN1200.13, The Things Network's spreadsheet", 2.6
+    yield "LoRa, 13 octets at SF9, 125 kHz, µs", sheet, 164_864, _us(lora_ns(13, 9, 125_000)), 0
+    yield "LoRa, 64 octets at SF12, 125 kHz, µs", sheet, 2_793_472, _us(lora_ns(64, 12, 125_000, low_data_rate=True)), 0
+    for spreading_factor, stated_dbm in ((7, -123.0), (9, -129.0), (12, -136.0)):
+        radio = radio_of("lora-eu868", [f"radio.lora.spreading_factor={spreading_factor}"])
+        quantity = f"LoRa, sensitivity at SF{spreading_factor}, 125 kHz, dBm, ± {limit_db:g} dB"
+        yield quantity, "SX1276 data sheet, table 10", stated_dbm, sensitivity_of(radio), limit_db / -stated_dbm
+    for nodes in (100, 200, 400):
+        by_rule, by_medium = extraction(nodes, LORA_FRAMES, seed=1)
+        quantity = f"LoRaSim's SN1, {nodes} nodes, data extraction rate, ± {DER_LIMIT:g}"
+        yield quantity, "Bor et al. 2016, LoRaSim's rule", by_rule, by_medium, DER_LIMIT / by_rule
 
 
 def _us(ns: float) -> float:

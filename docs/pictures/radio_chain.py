@@ -26,7 +26,13 @@ STEPS = (
     (
         Step(AGENT, "agent", ("radio.send(…)",), ("too_large",)),
         Step(SENDER, "queue", ("queue_limit,", "queue_lifetime_s"), ("queue_full", "sender_dead")),
-        Step(SENDER, "medium access", ("none, aloha,", "csma-802154, dcf, esb"), ("channel_busy",), is_phy=True),
+        Step(
+            SENDER,
+            "medium access",
+            ("none, aloha, cad,", "csma-802154, dcf, esb"),
+            ("channel_busy", "duty_cycle"),
+            is_phy=True,
+        ),
         Step(LINK, "path loss", ("four models;", "disk: range_m"), ("out_of_range",)),
         Step(LINK, "walls, bodies", ("dB by material;", "disk: line of sight"), ("blocked",)),
         Step(LINK, "shadowing", ("a field over", "the arena"), is_phy=True),

@@ -77,6 +77,33 @@ def ieee80211n_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
     return 36 * US - (-(22 + 8 * psdu_octets) // HT_BITS_PER_SYMBOL[rate_bps]) * 4 * US
 
 
+def lora_symbol_ns(spreading_factor: int, bandwidth_hz: int) -> int:
+    """Return the symbol time of LoRa, 2^SF / BW: whole ns at 125, 250 and 500 kHz."""
+    return NS_PER_S * 2**spreading_factor // bandwidth_hz
+
+
+def lora_ns(
+    payload_octets: Octets,
+    spreading_factor: int,
+    bandwidth_hz: int,
+    *,
+    parity_bits: int = 1,
+    preamble_symbols: int = 8,
+    explicit_header: bool = True,
+    crc: bool = True,
+    low_data_rate: bool = False,
+) -> Octets:
+    """Return the airtime of LoRa: (n + 4.25 + 8 + max(ceil(bits / (4 (SF - 2 DE))) (CR + 4), 0)) symbols.
+
+    bits = 8 PL - 4 SF + 28 + 16 CRC - 20 IH. CR is `parity_bits`, 1 (4/5) to 4 (4/8); n is `preamble_symbols`; CRC and
+    DE (low data rate) are 1 if on; IH is 1 for an implicit header (SX1276 data sheet, rev. 7, 4.1.1.7).
+    """
+    bits = 8 * payload_octets - 4 * spreading_factor + 28 + 16 * crc - 20 * (not explicit_header)
+    blocks = -(-bits // (4 * (spreading_factor - 2 * low_data_rate)))
+    quarter_symbols = 4 * (preamble_symbols + 8) + 17 + 4 * (parity_bits + 4) * (blocks * (blocks > 0))
+    return quarter_symbols * (lora_symbol_ns(spreading_factor, bandwidth_hz) // 4)
+
+
 @dataclass(frozen=True, slots=True)
 class UnslottedCsma:
     """Unslotted CSMA/CA of IEEE 802.15.4 at 2.4 GHz, with the standard's defaults (2006: 6.4.2, 7.4.2, 7.5.1.4).
@@ -170,6 +197,32 @@ class Esb:
 
 
 ESB = Esb()
+
+
+CAD_QUARTER_SYMBOLS = 9  # 2.25 symbols, the longest CAD of an SX127x
+CAD_HANDLING_NS = 7_600 * US  # propagation over 30 km, turnaround and processing, as Meshtastic adds them up
+
+
+def lora_cad(symbol_ns: int, turnaround_ns: int) -> UnslottedCsma:
+    """Return the access of Meshtastic: U{0 .. 2^CW - 1} slots, then channel activity detection (CAD), until it is idle.
+
+    A slot is 2.25 symbols and 7.6 ms. CW is 3 and grows to 8, by one with each busy CAD; Meshtastic takes it from the
+    channel's utilisation in the last minute (firmware 2.7, RadioInterface.cpp). A CAD detects frames that a receiver
+    could decode.
+    """
+    cad_ns = CAD_QUARTER_SYMBOLS * symbol_ns // 4
+    return UnslottedCsma(
+        symbol_ns=symbol_ns,
+        backoff_ns=cad_ns + CAD_HANDLING_NS,
+        cca_ns=cad_ns,
+        cca_ed_above_sensitivity_db=0.0,
+        turnaround_ns=turnaround_ns,
+        min_be=3,
+        max_be=8,
+        max_backoffs=10**9,
+    )
+
+
 IEEE_802_15_4 = UnslottedCsma()
 IEEE_802_11B = Dcf(10 * US, 20 * US, 31)  # DSSS and CCK
 IEEE_802_11A = Dcf(16 * US, 9 * US, 15)  # OFDM at 5 GHz

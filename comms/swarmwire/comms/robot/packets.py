@@ -42,6 +42,7 @@ class Fate(ExplainedEnum):
     BURST = 13, "lost by a burst, while the link was in its bad state"
     CHANNEL_BUSY = 14, "the sender found the medium busy each time it listened: never on air"
     JAMMED = 15, "a jammer disturbed it: without the jammer it would have been received"
+    DUTY_CYCLE = 16, "the sender would have exceeded its airtime of an hour: never on air"
 
 
 FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # names in summaries and tables, by value

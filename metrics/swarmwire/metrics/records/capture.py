@@ -95,7 +95,7 @@ class Link(NamedTuple):
 
 def link_of(radio: Radio) -> Link:
     """Return link type and encoding of a radio's frames."""
-    if radio.is_phy and radio.frame != "plain":
+    if radio.is_phy and radio.frame.startswith("802.11"):
         interface_frame = partial(_ethernet_80211, radio) if radio.interface else None
         headers = partial(_headers_80211, radio)
         return Link(IEEE802_11_RADIOTAP, 1 << 24, headers, interface_frame, IEEE802_11_RADIOTAP)

@@ -131,7 +131,7 @@ class RadioCoverage:
         """Return mean powers in dBm, rising, and the delivery at each."""
         assert self.sensitivity_dbm is not None
         params = phy_params_of(self._radio, 1)
-        noise_dbm = self._radio.noise_or_default.power_dbm
+        noise_dbm = self._radio.detector_noise_dbm
         low_dbm = min(noise_dbm, self.sensitivity_dbm) - FADING_RANGE_DB
         high_dbm = max(noise_dbm, self.sensitivity_dbm) + FADING_RANGE_DB
         mean_dbm = np.arange(low_dbm, high_dbm, POWER_STEP_DB)

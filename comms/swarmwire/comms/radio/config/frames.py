@@ -50,6 +50,8 @@ ACK_80211_BYTES = 14  # PSDU
 
 def airtime_ns(radio: Radio, frame_bytes: IntArray) -> IntArray:
     """Airtime of frames of these sizes, overhead included, in ns, (k,)."""
+    if radio.lora_or_none is not None:
+        return radio.lora_or_none.airtime_ns(frame_bytes)
     if radio.frame == "802.11b":
         return ieee80211b_ns(frame_bytes, radio.bit_rate_bps, short_preamble=False)
     if radio.frame == "802.11a":
@@ -94,7 +96,7 @@ def acknowledgement_bytes(radio: Radio) -> int:
     """Size of an acknowledgement; of esb, that of a null packet."""
     if radio.frame == "esb":
         return ESB.null_octets + radio.overhead_bytes
-    return ACK_802154_BYTES if radio.frame == "plain" else ACK_80211_BYTES
+    return ACK_802154_BYTES if radio.frame in ("plain", "lora") else ACK_80211_BYTES
 
 
 def acknowledgement_rate_bps(radio: Radio) -> int:

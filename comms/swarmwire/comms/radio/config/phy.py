@@ -163,7 +163,7 @@ class ReceiverNoise:
 
 
 RATE_CONTROLS = ("fixed", "ideal", "aarf")
-METHODS = ("none", "aloha", "csma-802154", "dcf", "esb")
+METHODS = ("none", "aloha", "csma-802154", "dcf", "esb", "cad")
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,8 @@ class Access:
     method: str = parameter(
         "none",
         help="none: frames never interfere; aloha: frames interfere, and radios send at once; csma-802154: unslotted "
-        "CSMA/CA; dcf: CSMA/CA of IEEE 802.11; esb: a station polls all others, which only answer",
+        "CSMA/CA; dcf: CSMA/CA of IEEE 802.11; esb: a station polls all others, which only answer; cad: channel "
+        "activity detection of LoRa",
         choices=METHODS,
     )
     acknowledged: bool = parameter(

@@ -206,6 +206,16 @@ _WIFI_N: dict[str, Any] = {
     "noise": {"bandwidth_hz": 20e6, "figure_db": 7.0},
     "reception": {"model": "802.11ag", "preamble_sinr_db": 4.0, "preamble_dbm": -82.0, "capture_window_s": 4e-6},
 }
+_LORA: dict[str, Any] = {
+    "model": "log-distance",
+    "frame": "lora",
+    "overhead_bytes": 4,
+    "max_payload_bytes": 251,
+    "log_distance": {"exponent": 3.0},
+    "noise": {"figure_db": 6.0},
+    "access": {"method": "aloha"},
+}
+_LORA_DIFFERENCES = "the decoder is a threshold of SINR, without bit errors; one channel"
 STANDARDS: dict[str, Preset] = {
     "ieee802154": Preset(
         "IEEE 802.15.4 at 2.4 GHz, 0 dBm, sensitivity -101 dBm, unslotted CSMA/CA, short addresses",
@@ -251,6 +261,28 @@ STANDARDS: dict[str, Preset] = {
         "IEEE 802.11n ad hoc at 65 Mbit/s (MCS 7, one stream, 20 MHz) in channel 36, UDP over IPv4",
         "IEEE 802.11n-2009; power, noise figure, preamble and queue as in ns-3",
         {**_WIFI_N, "frequency_hz": 5.18e9},
+    ),
+    "lora-eu868": Preset(
+        "LoRa (SX127x) at 868.1 MHz: SF7, 125 kHz, 14 dBm, sensitivity -124.5 dBm, without listening, duty cycle 1 %",
+        "Semtech, SX1276 data sheet, rev. 7; ETSI EN 300 220-2, band of 868.0 to 868.6 MHz; RadioHead's header",
+        {
+            **_LORA,
+            "frequency_hz": 868.1e6,
+            "antenna": {"power_dbm": 14.0},
+            "lora": {"duty_cycle": 0.01},
+        },
+        _LORA_DIFFERENCES,
+    ),
+    "lora-us915": Preset(
+        "LoRa (SX127x) at 903.9 MHz: SF7, 125 kHz, 20 dBm, sensitivity -124.5 dBm, without listening, dwell 0.4 s",
+        "Semtech, SX1276 data sheet, rev. 7; 47 CFR 15.247 (a) (1) (i); RadioHead's header",
+        {
+            **_LORA,
+            "frequency_hz": 903.9e6,
+            "antenna": {"power_dbm": 20.0},
+            "lora": {"max_airtime_s": 0.4},
+        },
+        f"{_LORA_DIFFERENCES}, also where the law demands hopping",
     ),
     "ble-1M": Preset(
         "Bluetooth LE advertising at 1 Mbit/s, 0 dBm, sensitivity -96 dBm: 27 bytes, sent without listening",

@@ -3,7 +3,7 @@
 No kernels: a scenario is read without a compiler.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from ipaddress import IPv4Network
 
 from swarmwire.comms.base.config import parameter
@@ -11,6 +11,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.ethernet import HEADER_BYTES
 from swarmwire.comms.radio.config.antennas import Antenna, check_pattern
 from swarmwire.comms.radio.config.impairments import Bursts, Delays, Measures, refuse_negative
+from swarmwire.comms.radio.config.lora import LORA_RECEPTION, Lora, refuse_unfit_lora
 from swarmwire.comms.radio.config.path_loss_models import Friis, ItuIndoor, LogDistance, TwoRay
 from swarmwire.comms.radio.config.phy import (
     Access,
@@ -56,7 +57,7 @@ DATAGRAM_BYTES = 28  # IPv4 and UDP headers
 MIN_MTU_BYTES = 68  # IPv4 (RFC 791)
 POSITIONS = ("held", "interpolated")
 MODELS = ("unit-disk", "log-distance", "friis", "two-ray", "itu-indoor")
-FRAMES = ("plain", "802.11a", "802.11b", "802.11g", "802.11n", "esb")
+FRAMES = ("plain", "802.11a", "802.11b", "802.11g", "802.11n", "esb", "lora")
 
 
 @dataclass(frozen=True)
@@ -142,6 +143,7 @@ class Radio:
     log_distance: LogDistance | None = parameter(None, help="parameters of the model log-distance")
     two_ray: TwoRay | None = parameter(None, help="parameters of the model two-ray")
     itu_indoor: ItuIndoor | None = parameter(None, help="parameters of the model itu-indoor")
+    lora: Lora | None = parameter(None, help='frame "lora" only: modulation, duty cycle and dwell time')
     antenna: Antenna | None = parameter(None, help="PHY only: transmit power, gain and pattern of antennas")
     shadowing: Shadowing | None = parameter(None, help="PHY only: loss in the surroundings, which varies with position")
     walls: Walls | None = parameter(None, help="PHY only: loss in obstacles that do not block")
@@ -214,13 +216,29 @@ class Radio:
 
     @property
     def noise_or_default(self) -> ReceiverNoise:
-        """The receiver noise of the scenario, or the default."""
-        return self.noise or ReceiverNoise()
+        """The receiver noise of the scenario, or the default; LoRa has the bandwidth of its modulation."""
+        noise, lora = self.noise or ReceiverNoise(), self.lora_or_none
+        return noise if lora is None else replace(noise, bandwidth_hz=lora.bandwidth_hz)
+
+    @property
+    def lora_or_none(self) -> Lora | None:
+        """The modulation of a radio with LoRa, None for others."""
+        return self.lora or Lora() if self.frame == "lora" else None
+
+    @property
+    def despreading_db(self) -> float:
+        """What the detector takes off noise and jammers, beside frames of other robots; 0 except for LoRa."""
+        return 0.0 if self.lora_or_none is None else self.lora_or_none.despreading_db
+
+    @property
+    def detector_noise_dbm(self) -> float:
+        """Noise at the detector in dBm, on the scale of received signals."""
+        return self.noise_or_default.power_dbm - self.despreading_db
 
     @property
     def reception_or_default(self) -> Reception:
-        """The reception of the scenario, or the default."""
-        return self.reception or Reception()
+        """The reception of the scenario, or the default; that of LoRa follows from its modulation."""
+        return LORA_RECEPTION if self.frame == "lora" else self.reception or Reception()
 
     @property
     def access_or_default(self) -> Access:
@@ -231,7 +249,7 @@ class Radio:
 # Checks of several keys: an error names the key that contradicts another.
 
 
-PHY_KEYS = ("antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")
+PHY_KEYS = ("lora", "antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")
 MODEL_KEYS = {"log_distance": "log-distance", "two_ray": "two-ray", "itu_indoor": "itu-indoor"}
 OFDM_MODELS = ("802.11ag", "802.11ag-nist")
 RECEPTIONS = {  # besides threshold and table
@@ -278,8 +296,26 @@ def check_radio(radio: Radio, where: str) -> None:
         raise BadInput(where, "radio.bit_rate_bps", f"{radio.frame} has {listed}; got {radio.bit_rate_bps} bit/s")
     if radio.is_phy:
         _check_fits(radio, where)
+    _check_lora(radio, where)
     if radio.interface is not None:
         _check_interface(radio, radio.interface, where)
+
+
+def _check_lora(radio: Radio, where: str) -> None:
+    lora = radio.lora_or_none
+    if lora is None:
+        if radio.lora is not None:
+            raise BadInput(where, "radio.lora", f'expected frame = "lora" with it, got "{radio.frame}"')
+        return
+    if not radio.is_phy:
+        raise BadInput(where, "radio.frame", 'expected a model with a PHY for "lora": a unit disk has no modulation')
+    if radio.bit_rate_bps != Radio.bit_rate_bps:
+        raise BadInput(where, "radio.bit_rate_bps", 'expected none for frame = "lora": radio.lora determines it')
+    if radio.reception is not None:
+        raise BadInput(where, "radio.reception", 'expected none for frame = "lora": radio.lora determines it')
+    if radio.noise is not None and radio.noise.bandwidth_hz != ReceiverNoise.bandwidth_hz:
+        raise BadInput(where, "radio.noise.bandwidth_hz", "expected none: radio.lora.bandwidth_hz determines it")
+    refuse_unfit_lora(lora, radio.overhead_bytes, radio.max_payload_bytes, where)
 
 
 def _check_interface(radio: Radio, interface: Interface, where: str) -> None:
@@ -340,6 +376,8 @@ def _check_phy(radio: Radio, where: str) -> None:
     if method == "esb" and radio.max_payload_bytes > ESB.max_payload_octets:
         expected = f"expected at most {ESB.max_payload_octets} with frames of esb; got {radio.max_payload_bytes}"
         raise BadInput(where, "radio.max_payload_bytes", expected)
+    if method == "cad" and radio.frame != "lora":
+        raise BadInput(where, "radio.access.method", f'expected frame = "lora" for "cad", got {radio.frame}')
 
 
 def _check_fits(radio: Radio, where: str) -> None:

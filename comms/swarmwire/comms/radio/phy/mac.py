@@ -12,7 +12,7 @@ import numpy as np
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import BROADCAST, NO_PACKET, NO_ROBOT, UNDER_WAY
-from swarmwire.comms.radio.phy import csma, dcf, jamming, reception, results, tx_queue
+from swarmwire.comms.radio.phy import csma, dcf, duty_cycle, jamming, reception, results, tx_queue
 from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.state import (
     ACKNOWLEDGEMENT,
@@ -79,7 +79,7 @@ def send(params, state, events, buffer, r, now_ns):
         results.record_last_attempt(state, buffer, r, now_ns)
         tx_queue.wait_interframe(params, state, events, r, packet.ifs_ns, now_ns)
         return
-    packet.on_air_at_ns = now_ns
+    packet.on_air_at_ns = now_ns - params.lead_ns
     robot.mac_state = SENDING
     if state.switch.is_on[r]:
         use_current_links(state, r)
@@ -89,7 +89,8 @@ def send(params, state, events, buffer, r, now_ns):
     robot.on_air, robot.to, robot.sequence = DATA, packet.to, packet.sequence
     robot.rate = params.data_rate if packet.to != BROADCAST else params.broadcast_rate
     robot.duration_ns = params.data_duration_ns if packet.to != BROADCAST else 0
-    reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns, packet.bits)
+    duty_cycle.spend(params, state, r, packet.airtime_ns, packet.on_air_at_ns)
+    reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns - params.lead_ns, packet.bits)
 
 
 @kernel()

@@ -19,6 +19,7 @@ from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.liveness import LivenessHistory
 from swarmwire.comms.radio.model import RadioModel
 from swarmwire.comms.radio.phy import esb, jamming, mac, tx_queue
+from swarmwire.comms.radio.phy.duty_cycle import airtime_log
 from swarmwire.comms.radio.phy.event_queue import event_queue
 from swarmwire.comms.radio.phy.graph import RadioGraph
 from swarmwire.comms.radio.phy.ht import events
@@ -134,6 +135,7 @@ class SinrPhy(RadioModel):
         # Queues are set up again if packets are new; no event is due before `_next_ns`.
         self._order, self._start = np.empty(0, np.int64), np.zeros(rows + 1, np.int64)
         self._is_new, self._next_ns, self._buffer = True, 0, result_buffer(MIN_CAPACITY)
+        self._spent = airtime_log(rows, context.radio)
         self._switch = tx_queue.switches_of(context.disruption)
         is_esb = context.radio.access_or_default.method == "esb"
         self._esb_timing = esb.esb_timing(context.radio) if is_esb else None
@@ -162,7 +164,7 @@ class SinrPhy(RadioModel):
         if not all(map(np.array_equal, self._gains, (now.send_gain_db, now.receive_gain_db))):
             self._links.tune(self._propagation_params(), thresholds_of(self._radio, self._params))
         self._links.move(pose, self._robot, self._reception)
-        self._jam.move(pose, self._links.propagation)
+        self._jam.move(pose, self._links.propagation, self._radio.despreading_db)
         if self._jam.anything or self._was_jammed:
             self._refresh()
         self._was_jammed = self._jam.anything
@@ -178,6 +180,8 @@ class SinrPhy(RadioModel):
         self._radio, self._params = radio, phy_params_of(radio, self._context.robots)
         self._frames = frames_of(radio)
         self._esb_timing = self._esb_timing and esb.esb_timing(radio)
+        if not len(self._spent.minute):
+            self._spent = airtime_log(len(self._robot), radio)
         self._losses.tune(context, at_ns)
         self._graph.tune(radio, self._params)
         self._reports.tune(context)
@@ -284,6 +288,7 @@ class SinrPhy(RadioModel):
             self._packets.table,
             self._order,
             switch,
+            self._spent,
             self._jam.between(self._now_ns, until_ns),
             self._ht,
         )

@@ -17,13 +17,14 @@ from swarmwire.comms.radio.config.frames import (
 )
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.phy.duty_cycle import allowance_ns
 from swarmwire.comms.radio.phy.ht.params import HT_RATES_BPS, HtParams, ht_params_of
 from swarmwire.comms.radio.phy.link_table import Thresholds
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, sensitivity_of
 from swarmwire.comms.radio.phy.success import log_success_table
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sinr_for_db
-from swarmwire.comms.radio.timing import ESB, IEEE_802_15_4
+from swarmwire.comms.radio.timing import ESB, IEEE_802_15_4, lora_cad
 
 CERTAIN = 1.0 - 1e-12
 FOREVER_NS = 2**62
@@ -41,6 +42,8 @@ class PhyParams(NamedTuple):
     min_preamble_sinr: float  # lowest SINR of a detected preamble
     min_preamble_mw: float  # lowest power of a detected preamble
     error_free_sinr: float  # least SINR at which no bit is wrong
+    lead_ns: int  # start of a frame that neither disturbs others nor is disturbed
+    allowance_ns: int  # airtime of a robot within an hour
     capture_window_ns: int  # time after a frame's start in which a stronger frame can capture the receiver
     cca_ed_mw: float  # CCA energy detection threshold
     max_retries: int
@@ -78,7 +81,11 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     """Return the PHY parameters of a radio; each arena has `robots` robots."""
     reception, access = radio.reception_or_default, radio.access_or_default
     receiver = receiver_of(reception, radio.bit_rate_bps)
+    lora, method = radio.lora_or_none, access.method
+    lead_ns = 0 if lora is None or method == "none" else lora.lead_ns
     csma, dcf = IEEE_802_15_4, dcf_of(radio)
+    if lora is not None and method == "cad":  # the procedure of CSMA/CA with other numbers
+        csma, method = lora_cad(lora.symbol_ns, lead_ns), "csma-802154"
     is_dcf, is_esb = access.method == "dcf", access.method == "esb"
     cca_threshold_dbm = access.cca_threshold_dbm
     if cca_threshold_dbm is None:
@@ -104,14 +111,16 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
     max_bits = 8 * (radio.max_payload_bytes + radio.overhead_bytes)
     return PhyParams(
         robots=robots,
-        method=METHODS.index(access.method),
+        method=METHODS.index(method),
         acknowledged=access.acknowledges,
         queue_limit=radio.queue_limit,
         queue_lifetime_ns=FOREVER_NS if radio.queue_lifetime_s is None else to_ns(radio.queue_lifetime_s),
-        noise_mw=float(from_db(radio.noise_or_default.power_dbm)),
+        noise_mw=float(from_db(radio.detector_noise_dbm)),
         min_preamble_sinr=float(from_db(reception.preamble_sinr_db)),
         min_preamble_mw=float(from_db(reception.preamble_dbm)),
         error_free_sinr=float(from_db(sinr_for_db(receiver, CERTAIN, max_bits))),
+        lead_ns=lead_ns,
+        allowance_ns=allowance_ns(radio),
         capture_window_ns=to_ns(reception.capture_window_s),
         cca_ed_mw=float(from_db(cca_threshold_dbm)),
         max_retries=max_retries,

@@ -40,7 +40,7 @@ def sensitivity_of(radio: Radio) -> float:
 
     It is at least the power at which preambles are detected.
     """
-    reception, noise_dbm = radio.reception_or_default, radio.noise_or_default.power_dbm
+    reception, noise_dbm = radio.reception_or_default, radio.detector_noise_dbm
     bits_dbm = reception.sensitivity_dbm
     if bits_dbm is None:
         success, frame_bytes = DATA_SHEET_SENSITIVITY.get(
@@ -65,7 +65,7 @@ def range_of(radio: Radio) -> float | None:
 
 def cut_off_dbm(radio: Radio) -> float:
     """Return the mean power in dBm below which a signal is neither received nor interference."""
-    return min(radio.noise_or_default.power_dbm, sensitivity_of(radio)) - radio.cut_off_db
+    return min(radio.detector_noise_dbm, sensitivity_of(radio)) - radio.cut_off_db
 
 
 SHADOWING_MARGIN = 2.5  # standard deviations of shadowing that a link may gain over its path loss

@@ -133,6 +133,13 @@ class RadioSwitches(NamedTuple):
     drop_fate: IntArray  # fate of packets to send while the radio is off, under DROP
 
 
+class AirtimeLog(NamedTuple):
+    """Airtime of robots by minute, (rows, minutes) each; no rows without a duty cycle."""
+
+    minute: IntArray  # number of the minute
+    airtime_ns: IntArray  # airtime of frames that started in it
+
+
 class PhyState(NamedTuple):
     """The tables that events read and change."""
 
@@ -145,6 +152,7 @@ class PhyState(NamedTuple):
     packet: Table
     order: IntArray  # rows of packets by sender, in the order of sending
     switch: RadioSwitches
+    spent: AirtimeLog
     jam: JammerSchedule
     ht: tuple[Any, ...] | None  # `HtState` of radios of 802.11n
 

@@ -11,7 +11,7 @@ from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import NO_FATE, NO_PACKET
 from swarmwire.comms.radio.config.phy import METHODS
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
-from swarmwire.comms.radio.phy import csma, dcf, results
+from swarmwire.comms.radio.phy import csma, dcf, duty_cycle, reception, results
 from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, SEND, SEND_ACK, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.state import (
     AWAITING_ACK,
@@ -27,7 +27,8 @@ from swarmwire.comms.radio.phy.state import (
 )
 from swarmwire.comms.robot.packets import Fate, TxResult
 
-QUEUE_FULL, TOO_LARGE, TX_QUEUE_FULL = int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE), int(TxResult.QUEUE_FULL)
+QUEUE_FULL, TOO_LARGE, DUTY_CYCLE = int(Fate.QUEUE_FULL), int(Fate.TOO_LARGE), int(Fate.DUTY_CYCLE)
+TX_QUEUE_FULL = int(TxResult.QUEUE_FULL)
 CSMA = METHODS.index("csma-802154")
 
 
@@ -42,6 +43,8 @@ def enqueue(params, state, events, buffer, r, now_ns):
         robot.enqueue_next += 1
         if packet.is_too_large:
             results.record_at_sender(state, buffer, index, TOO_LARGE, now_ns)
+        elif duty_cycle.exceeds(params, state, r, packet.airtime_ns, now_ns):
+            results.record_at_sender(state, buffer, index, DUTY_CYCLE, now_ns)
         elif state.switch.backlog[r] != NEWEST and _is_full(params, state, r):
             packet.result = TX_QUEUE_FULL
             results.record_at_sender(state, buffer, index, QUEUE_FULL, now_ns)
@@ -91,11 +94,17 @@ def _pop_next(state, r):
 
 @kernel()
 def drop_expired(params, state, buffer, r, now_ns):
-    """End packets that waited too long before the radio may send; return True if a packet is left to send."""
+    """End packets that waited too long, or exceed the duty cycle; return True if a packet is left to send."""
     robot = state.robot[r]
-    while robot.attempt == 0 and now_ns - state.packet[robot.packet].sent_at_ns > params.queue_lifetime_ns:
-        state.packet[robot.packet].result = TX_QUEUE_FULL
-        results.record_at_sender(state, buffer, robot.packet, QUEUE_FULL, now_ns)
+    while robot.attempt == 0:
+        packet = state.packet[robot.packet]
+        if now_ns - packet.sent_at_ns > params.queue_lifetime_ns:
+            packet.result = TX_QUEUE_FULL
+            results.record_at_sender(state, buffer, robot.packet, QUEUE_FULL, now_ns)
+        elif duty_cycle.exceeds(params, state, r, packet.airtime_ns, now_ns):
+            results.record_at_sender(state, buffer, robot.packet, DUTY_CYCLE, now_ns)
+        else:
+            return True
         if not _pop_next(state, r):
             return False
     return True
@@ -113,7 +122,9 @@ def begin_attempt(params, state, events, r, now_ns):
         dcf.request_access(params, state, events, r, now_ns)
     else:
         robot.mac_state = BACKING_OFF
-        schedule(events, SEND, r, now_ns)
+        if params.lead_ns > 0:
+            reception.stop_receiving(state, r)
+        schedule(events, SEND, r, now_ns + params.lead_ns)
 
 
 @kernel()

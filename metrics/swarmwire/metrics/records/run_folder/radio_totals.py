@@ -35,6 +35,7 @@ SENDER_FATES = {
     Fate.IN_FLIGHT,
     Fate.SENDER_DEAD,
     Fate.CHANNEL_BUSY,
+    Fate.DUTY_CYCLE,
 }
 RECEIVER_FATES = tuple(fate for fate in Fate if fate not in SENDER_FATES)
 FATES = len(FATE_NAMES)
