@@ -6,7 +6,7 @@ import pytest
 
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.radio import Radio
-from tests.support.comms.radio import at, make_medium, packets, run
+from tests.support.comms.radio import TICK_NS, Run, at, make_medium, packets, run
 from tests.unit.world.scenario.test_bodies import radio_of
 
 PAIR = at((0, 0), (1, 0))
@@ -35,3 +35,15 @@ def test_80211n_single_packet_is_received_after_access_and_airtime(name: str, mb
     assert result.fates() == {"RECEIVED": 1}
     (at_ns,) = result.received("received_at_ns").tolist()
     assert 0 <= at_ns - 1000 * us < (9_000 if name == "wifi-n-5G" else 20_000)
+
+
+def test_80211n_bit_rate_may_change_during_a_run():
+    """From the second tick on MCS 0 in place of MCS 7."""
+    radio = preset(bit_rate_bps=65_000_000)
+    slow, medium = replace(radio, bit_rate_bps=6_500_000), make_medium(radio, 2)
+    out = Run(medium)
+    for tick in range(3):
+        out.news.append(medium.step(tick * TICK_NS, PAIR, radio=slow if tick == 1 else None))
+        medium.send(tick * TICK_NS, tick, packets([0], 1, 100))
+    airtime_us = (out.departed("off_air_at_ns") - out.departed("on_air_at_ns")) // 1000
+    assert airtime_us.tolist() == [36 + 4 * 6, 36 + 4 * 52]
