@@ -14,6 +14,12 @@ swarmwire export "$runs/split" --at 35 --to docs/split.png
 swarmwire export "$runs/pso" --at 55 --to docs/pso.png
 swarmwire run scenarios/drones.toml --quiet --no-rrd --out "$runs/drones"
 swarmwire export "$runs/drones" --at 50 --to docs/drones.png
+swarmwire new "$runs/my_swarm" # as in docs/getting-started.md
+swarmwire run "$runs/my_swarm" --quiet --no-rrd --packets all --out "$runs/first"
+swarmwire export "$runs/first" --at 4 --to docs/first.png
+swarmwire sweep "$runs/my_swarm" --vary radio.loss=0,0.9,0.95,0.98 --seeds 5 --set duration_s=10 --out "$runs/loss"
+swarmwire report "$runs/loss"
+cp "$runs/loss/figures/response-order.final-radio.loss.svg" docs/first-report.svg
 for body in crazyflie epuck epuck2 flockbot footbot kilobot point turtlebot3-burger turtlebot4; do
   swarmwire draw "$body" --to "docs/bodies/$body.png"
 done

@@ -65,11 +65,12 @@ def test_output_shown_on_a_page_must_be_printed_in_its_order():
     assert first_not_printed(Command("", ("final …",)), printed) == "final …"
 
 
-def test_readme_agent_runs_with_the_table_of_the_readme(tmp_path):
+def test_readme_agent_runs_in_a_scenario_that_names_it(tmp_path):
     (tmp_path / "shy.py").write_text(blocks_of("README.md", "python")[0].text)
-    lossy = (ROOT / "scenarios" / "flocking-lossy.toml").read_text()
-    before, after = lossy[: lossy.index("[robots.flock]")], lossy[lossy.index("[radio]") :]
-    (tmp_path / "mine.toml").write_text(f"{before}{blocks_of('README.md', 'toml')[0].text}\n{after}")
+    shipped = 'agent = "swarmwire.agent.behaviours:Flocking"\nparams = { separation_m = 0.8 }\n'
+    before, after = (ROOT / "scenarios" / "flocking-lossy.toml").read_text().split(shipped)
+    [named] = re.findall(r'`(agent = "shy.py:Shy")`', (ROOT / "README.md").read_text())
+    (tmp_path / "mine.toml").write_text(f"{before}{named}\n{after}")
     result = run(tmp_path / "mine.toml", overrides=["duration_s=1"], runners=2)
     assert result.radio is not None
     assert result.radio.fates["received"] > 0
