@@ -157,7 +157,7 @@ def bianchi_mbps(stations: int) -> float:
 
 
 def _esb() -> Iterator[Line]:
-    source = "nRF24L01+ Product Specification v1.0, 7"
+    source = "nRF24LU1+ Product Specification v1.0, 6.4.9"
     for rate, bit_rate_bps in (("250k", 250_000), ("1M", 1_000_000), ("2M", 2_000_000)):
         frame_us = (8 * (1 + 5 + ESB_OCTETS + 2) + 9) * 1e6 / bit_rate_bps
         exchange_us = ESB_OCTETS + 2 * 130 + 2 * frame_us + (6.0 if rate == "2M" else 8.2)

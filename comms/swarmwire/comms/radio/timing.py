@@ -157,9 +157,9 @@ class Dcf:
 
 @dataclass(frozen=True, slots=True)
 class Esb:
-    """Enhanced ShockBurst of the nRF24L01+, with the values that the Crazyradio's firmware sets.
+    """Enhanced ShockBurst of the nRF24LU1+, with the values that the Crazyradio's firmware sets.
 
-    Source: Nordic, nRF24L01+ Product Specification v1.0 (6.1.7, 7.3, 7.4.2 and 7.6); crazyradio-firmware, radio.c.
+    Source: Nordic, nRF24LU1+ Product Specification v1.0 (6.3.1.7, 6.4.3, 6.4.6.2, 6.4.9); crazyradio-firmware, radio.c.
     """
 
     turnaround_ns: int = 130 * US  # Tstby2a, from standby, or between sending and receiving

@@ -16,6 +16,7 @@ from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.kernels import kernel, njit
 from swarmwire.comms.base.sentinels import BROADCAST, NO_PACKET, NO_TAG, NO_TX_STATUS, NOWHERE, UNDER_WAY
 from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.robot.messages import CRTP_TAG
 from swarmwire.comms.robot.packets import TAG_BYTES, SentPackets
 
 WAITING, DUE, DECIDED = range(3)  # steps of a packet: in its queue; leaving it; its links are in the table of links
@@ -132,15 +133,20 @@ def lacks_receiver(sender, to, robots):
 
 
 def frame_sizes(radio: Radio) -> tuple[int, IntArray]:
-    """Return the bytes of an interface's headers within `overhead_bytes`, and the bytes on air by `size_row`."""
+    """Return the bytes that only frames and CRTP packets save on air, and the bytes on air by `size_row`.
+
+    Of an interface's frame, `overhead_bytes` already counts some headers; the tag of a CRTP packet is not on air.
+    """
     headers_bytes = radio.frame_headers_bytes if radio.interface is not None else 0
+    if radio.frame == "esb":
+        headers_bytes = TAG_BYTES
     return headers_bytes, np.arange(-headers_bytes, radio.max_payload_bytes + 1) + radio.overhead_bytes
 
 
 @kernel()
 def size_row(packet, headers_bytes):
     """Return the row of a packet in `frame_sizes`; beyond its end if the packet is too large."""
-    return packet.size_bytes + headers_bytes * (packet.tag != FRAME_TAG)
+    return packet.size_bytes + headers_bytes * (packet.tag not in (FRAME_TAG, CRTP_TAG))
 
 
 class SentColumns(NamedTuple):

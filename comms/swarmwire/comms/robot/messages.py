@@ -50,7 +50,8 @@ STRUCT_FORMATS = {"<f4": "f", "<f8": "d", "|i1": "b", "<i2": "h", "<i4": "i", "|
 SEND_PARAMETERS = ("rows", "to")  # parameters of a VectorAgent's `send`; the others are the fields of the message
 DICT_TAG = 0  # tag of a dict in msgpack, for prototypes; no class has this tag
 RELAY_TAG = FRAME_TAG + 1  # tag of a packet of the relay of ROS 2 topics
-RESERVED_TAGS = (FRAME_TAG, RELAY_TAG)  # tags of packets that are no messages
+CRTP_TAG = FRAME_TAG + 2  # tag of a CRTP packet of a Crazyflie; not on air: esb carries the packet alone
+RESERVED_TAGS = (FRAME_TAG, RELAY_TAG, CRTP_TAG)  # tags of packets that are no messages
 
 
 class FieldRange(NamedTuple):

@@ -246,12 +246,16 @@ def parse_factor(realtime: float | str | None) -> float | None:
     return factor
 
 
-def checked_subtick(subtick: float | None, factor: float | None, scenario: Scenario) -> float | None:
-    """Return the sub-tick of a run in s of wall time; a real-time run with network interfaces always has one.
+def checked_subtick(
+    subtick: float | None, factor: float | None, scenario: Scenario, has_crazyradio: bool = False
+) -> float | None:
+    """Return the sub-tick of a run in s of wall time.
 
+    A real-time run with network interfaces, or with Crazyflies whose clients' packets cross the radio, always has one.
     `factor` is the real-time factor. BadInput for a sub-tick without real time or radio, or out of bounds.
     """
-    if subtick is None and factor is not None and scenario.radio and scenario.radio.interface:
+    needs_subticks = has_crazyradio or (scenario.radio is not None and scenario.radio.interface is not None)
+    if subtick is None and factor is not None and needs_subticks:
         subtick = MIN_SUBTICK_S
     if subtick is None:
         return None

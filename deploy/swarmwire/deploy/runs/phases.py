@@ -11,7 +11,7 @@ from swarmwire.comms.base.clock import PreciseClock, ScaledClock, WallClock, to_
 from swarmwire.comms.base.ethernet import FRAME_TAG
 from swarmwire.comms.base.extras import VIEW
 from swarmwire.comms.observe.interfaces import AgentBackend, Observer, StopConditions, TimedBackend
-from swarmwire.comms.robot.messages import DICT_TAG, RELAY_TAG, message_classes
+from swarmwire.comms.robot.messages import CRTP_TAG, DICT_TAG, RELAY_TAG, message_classes
 from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.deploy.machine import need_address_space, need_open_files, need_threads
 from swarmwire.deploy.runs.backends import (
@@ -54,6 +54,7 @@ from swarmwire.metrics.records.run_folder.table import RecordOptions
 from swarmwire.metrics.records.run_folder.tables import recorders
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.ports import PortsBackend
+from swarmwire.world.gateways.crazyflie.radio import CrazyradioPorts
 from swarmwire.world.gateways.ros2.radio import RosRadio
 from swarmwire.world.live_events import LiveEvents
 from swarmwire.world.loop import Loop
@@ -138,7 +139,9 @@ class PreparedRun:
         endpoint = self._observer_endpoint(stack)
         log = RunnerLog(writer.report)
         backend = stack.enter_context(open_backend(self._backend_settings(log), served))
-        loop = self._new_loop(backend, interfaces, ros_radio, pose_sources, log, stop_conditions)
+        loop = self._new_loop(
+            backend, interfaces, ros_radio, served.crazyradio if served else None, pose_sources, log, stop_conditions
+        )
         status = self._new_status(backend, loop, pose_sources)
         staged = self._staged_observers(loop, status, endpoint, observers)
         if served:
@@ -178,6 +181,7 @@ class PreparedRun:
         backend: AgentBackend,
         interfaces: OpenInterfaces | None,
         ros_radio: RosRadio | None,
+        crazyradio: CrazyradioPorts | None,
         pose_sources: Sequence[LiveSource],
         log: RunnerLog,
         stop_conditions: StopConditions | None,
@@ -193,6 +197,8 @@ class PreparedRun:
             acting = FollowingBackend(acting, pose_sources, self.pace, subtick_ns, first_poses)
         for ports in (ros_radio, interfaces.ports if interfaces else None):
             acting = PortsBackend(acting, ports, subtick_ns) if ports else acting
+        if crazyradio:
+            acting = PortsBackend(acting, crazyradio, subtick_ns, crazyradio.accept_statuses)
         acting = self.writer.record_actions(acting, partial(self._has_external_actions, backend, log))
         return Loop(
             self.world,
@@ -269,7 +275,7 @@ class PreparedRun:
         record, metrics, clock = self.plan.record, self.metrics, self.clock
         observers: list[Observer] = [TrajectoryLog(folder, loop.hexdigests)]  # first: it has each tick of a killed run
         if record.tables:
-            topics = {DICT_TAG: "dict", FRAME_TAG: "frame", RELAY_TAG: "relay"} | {
+            topics = {DICT_TAG: "dict", FRAME_TAG: "frame", RELAY_TAG: "relay", CRTP_TAG: "crtp"} | {
                 kind.tag: kind.__name__ for kind in message_classes()
             }
             may_drop = self.pace is not None

@@ -114,6 +114,8 @@ def make_plan(config: RunConfig) -> tuple[Plan, World]:
     gateways = None
     if config.gateways and (chosen := as_gateways(config.gateways)) and chosen.kinds:
         gateways = RunGateways(chosen, scenario)
+        if gateways.has_crazyradio:
+            scenario = gateways.with_safelink()
         factor = 1.0 if factor is None else factor
         sensors = gateways.sensors(sensors, bodies_of(scenario, scenario.source))
     world = World(scenario, choose_seeds(scenario, config.seed, config.seeds), sensors, config.threads)
@@ -134,7 +136,7 @@ def make_plan(config: RunConfig) -> tuple[Plan, World]:
         interfaces=None if replay else run_interfaces(scenario),
         gateways=gateways,
         factor=factor,
-        subtick_s=checked_subtick(config.subtick, factor, scenario),
+        subtick_s=checked_subtick(config.subtick, factor, scenario, gateways is not None and gateways.has_crazyradio),
         ticks=replay.ticks if replay else tick_count(scenario),
         runners=runners if config.listening is None else 1,
         isolation=Isolation(config.agent_network, config.isolate, hidden),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.protocols.ros2.relay import MAX_MESSAGE_BYTES, WINDOW, RelayedTopic, RobotRelay
-from swarmwire.comms.robot.messages import RELAY_TAG, Message
+from swarmwire.comms.robot.messages import CRTP_TAG, RELAY_TAG, Message
 
 HEADER_BYTES = 2 + 1 + 4 + 2 + 2  # of a part, by the page on the relay
 RETRY_NS, RETRIES = 300, 3
@@ -178,10 +178,10 @@ def test_relay_survives_any_bytes(data, tagged):
     assert all(len(packet.payload) <= 111 for packet in receiver.pop_packets())
 
 
-def test_tags_of_messages_are_none_of_frames_and_of_the_relay():
+def test_tags_of_messages_are_none_of_frames_the_relay_and_crtp():
     def plain_tag(name: str) -> int:
         return 1 + int.from_bytes(blake2b(f"{name}()".encode(), digest_size=2).digest(), "little") % 0xFFFF
 
-    frame, taken = 0x5302, (0x5302, RELAY_TAG)
+    frame, taken = 0x5302, (0x5302, RELAY_TAG, CRTP_TAG)
     names = [next(name for name in map("Try{}".format, count()) if plain_tag(name) == tag) for tag in taken]
-    assert [type(name, (Message,), {}).tag for name in names] == [frame + len(taken)] * 2
+    assert [type(name, (Message,), {}).tag for name in names] == [frame + len(taken)] * 3

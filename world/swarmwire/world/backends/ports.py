@@ -5,7 +5,7 @@ frames of robots' interfaces: in every sub-tick, or tick, it reads their packets
 sub-tick (`spread`), and passes received ones on to them. The wrapped backend gets only the agents' packets.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Protocol, cast
 
@@ -49,9 +49,20 @@ class PacketPorts(Protocol):
 class PortsBackend:
     """A backend in real time with packets of programs in addition to its own."""
 
-    def __init__(self, backend: AgentBackend | TimedBackend, ports: PacketPorts, subtick_ns: int) -> None:
-        """`subtick_ns` is the interval at which packets are read, in simulated time; 0 without sub-ticks."""
+    def __init__(
+        self,
+        backend: AgentBackend | TimedBackend,
+        ports: PacketPorts,
+        subtick_ns: int,
+        accept_statuses: Callable[[TxStatuses], TxStatuses] | None = None,
+    ) -> None:
+        """`subtick_ns` is the interval at which packets are read, in simulated time; 0 without sub-ticks.
+
+        `accept_statuses` gets all transmit statuses, and returns those of the agents' packets; None: the ports' packets
+        have none.
+        """
         self._backend, self._ports, self._subtick_ns = backend, ports, subtick_ns
+        self._accept_statuses = accept_statuses
         self._waiting: list[SubtickPackets] = []  # sorted by time; some wait for the next tick
         self._reads = self._spoofed = 0
         self.start, self.close = backend.start, backend.close
@@ -60,7 +71,7 @@ class PortsBackend:
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
         """Act as the wrapped backend; packets that programs sent within the tick are sent as those of agents."""
-        actions = self._backend.act(tick, readings, self._ports.deliver(received), tx_status)
+        actions = self._backend.act(tick, readings, self._ports.deliver(received), self.agents_statuses(tx_status))
         packets = SentPackets.joined(self._ports.pop_packets())
         self._ports.count_sent(packets)
         return replace(actions, sent=SentPackets.joined([self.of_agents(actions.sent), packets]))
@@ -70,12 +81,17 @@ class PortsBackend:
     ) -> Actions:
         """Act as the wrapped backend; its medium also carries packets of programs."""
         messages, backend = self._ports.deliver(received), cast("TimedBackend", self._backend)
-        return backend.act_in_time(tick, readings, messages, tx_status, _MediumWithPorts(medium, self))
+        statuses = self.agents_statuses(tx_status)
+        return backend.act_in_time(tick, readings, messages, statuses, _MediumWithPorts(medium, self))
 
     def counts(self) -> dict[str, int]:
         """Return the numbers of faults of the backend and of the ports, by name."""
         spoofed = {"packets_with_reserved_tag": self._spoofed} if self._spoofed else {}
         return {**self._backend.counts(), **self._ports.counts(), **spoofed}
+
+    def agents_statuses(self, tx_status: TxStatuses) -> TxStatuses:
+        """Return the statuses of the agents' packets."""
+        return self._accept_statuses(tx_status) if self._accept_statuses else tx_status
 
     def of_agents(self, sent: SentPackets) -> SentPackets:
         """Return the packets without those that pass for packets of programs, which it counts."""
@@ -130,7 +146,7 @@ class _MediumWithPorts:
         """Advance the medium, and exchange packets; those that programs sent until now go out after `until_ns`."""
         self._ports.send_waiting(self._medium, until_ns)
         received, tx_status = self._medium.advance(until_ns)
-        return self._ports.exchange(received, until_ns), tx_status
+        return self._ports.exchange(received, until_ns), self._ports.agents_statuses(tx_status)
 
     def set_poses(self, at_ns: int, poses: SparseTable) -> None:
         """Set poses, after the packets of programs that are due before them."""

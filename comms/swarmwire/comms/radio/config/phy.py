@@ -240,6 +240,11 @@ class Access:
         "highest for the last SINR at the receiver; aarf: by successes and failures",
         choices=RATE_CONTROLS,
     )
+    safelink: bool = parameter(
+        False,
+        help="esb only: cflib's Safelink: packets are repeated in further exchanges until they are acknowledged; true "
+        "behind --gateway crazyflie",
+    )
 
     @property
     def acknowledges(self) -> bool:

@@ -144,7 +144,8 @@ def _crazyradio(bit_rate_bps: int, sensitivity_dbm: float) -> "Preset":
     return Preset(
         f"Bitcraze's Crazyradio PA and Crazyflies at {rate}, 20 dBm, sensitivity {sensitivity_dbm:g} dBm: a station "
         "polls, drones answer; 32 bytes",
-        "Nordic, nRF24L01+ Product Specification v1.0, 6 and 7; crazyradio-firmware, radio.c; Bitcraze, Crazyradio PA",
+        "Nordic, nRF24LU1+ Product Specification v1.0, 5.2, 6.3 and 6.4; crazyradio-firmware, radio.c; Bitcraze, "
+        "Crazyradio PA",
         {
             "model": "log-distance",
             "frequency_hz": 2.48e9,  # channel 80, the default of cflib and of the firmware
@@ -168,8 +169,8 @@ def _crazyradio(bit_rate_bps: int, sensitivity_dbm: float) -> "Preset":
             "access": {"method": "esb"},
         },
         "stations share one channel; a receiver locks to frames with other addresses, too; the sensitivity is that of "
-        "the chip without the amplifier for reception; without Safelink, which cflib adds: a packet ends after ARC "
-        "repetitions",
+        "the chip without the amplifier for reception; without access.safelink, which cflib has, a packet ends after "
+        "ARC repetitions",
     )
 
 

@@ -266,6 +266,7 @@ ACCESS_KEYS = {  # methods of keys of [radio.access] that only some have
     "cca_time_s": ("dcf",),
     "station": ("esb",),
     "host_delay_s": ("esb",),
+    "safelink": ("esb",),
 }
 RATES_BPS = {
     "802.11a": tuple(OFDM_BITS_PER_SYMBOL),

@@ -4,6 +4,11 @@ A poll has the oldest packet that waits at the station for the drone, its answer
 null packet if nothing waits. Without an answer the poll is repeated after ARD, at most ARC times; then it is the next
 drone's turn. Both packets end with their exchange. Packets to all are sent before the next poll, and not answered.
 
+With Safelink, of cflib's driver and the Crazyflie's firmware, a packet of the station whose poll had no answer, and a
+packet of a drone that the station did not receive, are in the next exchange again. A sequence bit for each direction
+lets the receiver drop what it has already: a packet is received once. The link is lost, and these packets end, after
+`MAX_SILENT` exchanges without an answer, until there is one.
+
 A poll and its answer on air are frames of the kind DATA, also null packets. A station's `mac_state` is SPACING: it
 serves no packet of its queue in order. A drone's packet in service waits in BACKING_OFF, until it is polled.
 """
@@ -41,6 +46,7 @@ from swarmwire.comms.robot.packets import Fate, TxResult
 RECEIVED, QUEUE_FULL = int(Fate.RECEIVED), int(Fate.QUEUE_FULL)
 ACKNOWLEDGED, TX_QUEUE_FULL = int(TxResult.ACKNOWLEDGED), int(TxResult.QUEUE_FULL)
 MAX_ATTEMPTS = 16  # ARC + 1
+MAX_SILENT = 100  # exchanges without an answer after which cflib's driver closes the link ("Too many packets lost")
 
 
 class EsbTiming(NamedTuple):
@@ -51,6 +57,7 @@ class EsbTiming(NamedTuple):
     frame_bits: int
     upload_ns_per_bit: int
     idle_ns: int  # between an exchange and the upload of the next: T_IRQ, and the station's computer
+    has_safelink: bool
 
 
 class Polling(NamedTuple):
@@ -65,14 +72,16 @@ class Polling(NamedTuple):
     attempt: IntArray  # number of the attempt, from 0
     sequence: IntArray  # number of the packet in the exchange, or NO_PACKET for a null packet
     awaits: BoolArray  # True from the end of a poll to the answer's, or to ARD's
+    silent: IntArray  # of a drone: number of its latest exchanges without an answer
 
 
 def esb_timing(radio: Radio) -> EsbTiming:
     """Return the timing of a radio's polls."""
     null_bytes = np.array([acknowledgement_bytes(radio), radio.overhead_bytes])
     null_bits, empty_bits = frame_bits(radio, null_bytes).tolist()
-    idle_ns = ESB.irq_ns(radio.bit_rate_bps) + to_ns(radio.access_or_default.host_delay_s)
-    return EsbTiming(null_bits, acknowledgement_ns(radio), empty_bits, ESB.upload_ns // 8, idle_ns)
+    access = radio.access_or_default
+    idle_ns = ESB.irq_ns(radio.bit_rate_bps) + to_ns(access.host_delay_s)
+    return EsbTiming(null_bits, acknowledgement_ns(radio), empty_bits, ESB.upload_ns // 8, idle_ns, access.safelink)
 
 
 def new_polling(stations: tuple[int, ...], robots: int, arenas: int) -> Polling:
@@ -87,10 +96,9 @@ def new_polling(stations: tuple[int, ...], robots: int, arenas: int) -> Polling:
     others = np.flatnonzero(station != np.arange(rows))
     drones = others[np.argsort(station[others], kind="stable")]
     first, stop = (np.searchsorted(station[drones], np.arange(rows), side) for side in ("left", "right"))
-    zeros = np.zeros((3, rows), np.int64)
-    return Polling(
-        station, drones, first, stop, stop - 1, zeros[0], zeros[1], zeros[2] + NO_PACKET, np.zeros(rows, np.bool_)
-    )
+    exchange, attempt, silent = np.zeros((3, rows), np.int64)
+    no_packet, awaits = np.full(rows, NO_PACKET), np.zeros(rows, np.bool_)
+    return Polling(station, drones, first, stop, stop - 1, exchange, attempt, no_packet, awaits, silent)
 
 
 def are_linked(polling: Polling, a: IntArray, b: IntArray) -> BoolArray:
@@ -323,6 +331,7 @@ def _answer_ended(params, timing, polling, state, events, buffer, r, now_ns):
             tx_queue.begin_attempt(params, state, events, r, now_ns)
     if is_received and polling.awaits[station] and state.robot[station].to == r:
         cancel(events, TIMER, station)
+        polling.silent[r] = 0
         index = _packet_of(polling, state, station)
         if index != NO_PACKET:
             state.packet[index].result = ACKNOWLEDGED
@@ -337,22 +346,27 @@ def _ard_ended(params, timing, polling, state, events, buffer, r, now_ns):
         polling.attempt[r] += 1
         _send_poll(params, timing, polling, state, events, r, now_ns)
     else:
+        polling.silent[state.robot[r].to] += 1
         _end_exchange(params, timing, polling, state, events, buffer, r, now_ns)
 
 
 @kernel()
 def _end_exchange(params, timing, polling, state, events, buffer, r, now_ns):
-    """End the packets of the station's exchange, and schedule the next exchange.
+    """End the packets of the station's exchange, or repeat them with Safelink, and schedule the next exchange.
 
-    A drone's radio takes its packet for sent when the next poll comes, also if its answers were lost.
+    Without Safelink a drone's radio takes its packet for sent when the next poll comes, also if its answers were lost.
     """
     to = state.robot[r].to
-    _end_packet(polling, state, buffer, r, now_ns)
+    has_link = timing.has_safelink and to != BROADCAST and polling.silent[to] < MAX_SILENT
+    if not (has_link and polling.silent[to] > 0 and state.switch.is_on[r]):
+        _end_packet(polling, state, buffer, r, now_ns)
     polling.sequence[r], polling.awaits[r] = NO_PACKET, False
     if to != BROADCAST and state.robot[to].attempt > 0 and state.robot[to].mac_state >= BACKING_OFF:
-        state.packet[state.robot[to].packet].result = ACKNOWLEDGED
-        results.record_last_attempt(state, buffer, to, now_ns)
-        tx_queue.serve(params, state, events, to, now_ns)
+        packet = state.packet[state.robot[to].packet]
+        if packet.is_settled or not has_link:
+            packet.result = ACKNOWLEDGED
+            results.record_last_attempt(state, buffer, to, now_ns)
+            tx_queue.serve(params, state, events, to, now_ns)
     if state.switch.is_on[r]:
         schedule(events, TIMER, r, now_ns + timing.idle_ns)
     else:

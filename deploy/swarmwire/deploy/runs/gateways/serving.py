@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 from typing import Any
@@ -11,6 +11,7 @@ from swarmwire.comms.base.clock import DatedClock, ScaledClock, to_s
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
+from swarmwire.comms.radio.phy.esb import new_polling
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.wire.access_control import access_of
@@ -27,6 +28,9 @@ from swarmwire.deploy.runs.gateways.gateways import (
 )
 from swarmwire.metrics.text import abbreviate
 from swarmwire.world.gateways.backend import GatewayGroup
+from swarmwire.world.gateways.crazyflie.gateway import CrazyflieGateway
+from swarmwire.world.gateways.crazyflie.radio import CrazyradioPorts
+from swarmwire.world.gateways.gateway import Gateway
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, EmulatedTracker, RadioBridge
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.world import World
@@ -62,6 +66,7 @@ class Served:
     show_counts: Callable[[], dict[str, int]]  #: counts of poses that were not published
     swarm: str
     endpoints: tuple[str, ...]  #: endpoints of the robots' network
+    crazyradio: CrazyradioPorts | None  #: the radio of Crazyflies
 
     def robot_addresses(self) -> dict[int, tuple[str, str]]:
         """Return the gateway's address by index of the robots here: on one with a network of its own, and outside."""
@@ -86,6 +91,26 @@ class RunGateways:
         gateways.network.check(NETWORK_FIELD)
         self._choices: Mapping[str, GatewayChoice] = choose_gateways(gateways, scenario)
         self.kinds = {group: choice.kind for group, choice in self._choices.items()}
+
+    @property
+    def has_crazyradio(self) -> bool:
+        """True if packets of Crazyflies' clients cross the scenario's radio."""
+        radio, kinds = self._scenario.radio, (choice.gateway_class for choice in self._choices.values())
+        is_esb = radio is not None and radio.access_or_default.method == "esb"
+        return is_esb and any(issubclass(kind, CrazyflieGateway) for kind in kinds)
+
+    def with_safelink(self) -> Scenario:
+        """Return the scenario with Safelink on its radio, as cflib switches it on; BadInput if a station is a drone."""
+        scenario, radio, names = self._scenario, self._scenario.radio, self._scenario.robot_names()
+        assert radio
+        for group, robots in scenario.groups().items():
+            kind = self._choices[group].gateway_class if group in self._choices else Gateway
+            if issubclass(kind, CrazyflieGateway) and (drones := set(robots) & set(scenario.stations())):
+                expected = "expected a robot of a group without the gateway crazyflie, where the Crazyradio is"
+                raise BadInput(scenario.source, "radio.access.station", f"{expected}; got {names[min(drones)]}")
+        access = replace(radio.access_or_default, safelink=True)
+        self._scenario = scenario.model_copy(update={"radio": replace(radio, access=access)})
+        return self._scenario
 
     def check(self, arenas: int, runners: int) -> None:
         """Raise BadInput for options that exclude gateways."""
@@ -130,7 +155,8 @@ class RunGateways:
             report(gateways.network.warning)
         static, keys, scaled = world.static, SwarmKeys(gateways.swarm), ScaledClock(clock, pace)
         with ExitStack() as stack:
-            groups, addresses = self._open(stack, world, scaled, report, separate=separate)
+            crazyradio = self._crazyradio(static) if self.has_crazyradio else None
+            groups, addresses = self._open(stack, world, scaled, report, crazyradio, separate=separate)
             rows = {static.robot_names[row]: int(row) for group in groups for row in group.rows}
             access = access_of(gateways.network, keys, static.robot_names, gateways.network.tracker)
             radio = self._bridged_radio(static)
@@ -157,10 +183,18 @@ class RunGateways:
                 show_counts=tracker.counts,
                 swarm=gateways.swarm,
                 endpoints=endpoints,
+                crazyradio=crazyradio,
             )
 
     def _open(
-        self, stack: ExitStack, world: World, clock: DatedClock, report: Callable[[str], None], *, separate: bool
+        self,
+        stack: ExitStack,
+        world: World,
+        clock: DatedClock,
+        report: Callable[[str], None],
+        crazyradio: CrazyradioPorts | None,
+        *,
+        separate: bool,
     ) -> tuple[tuple[GatewayGroup, ...], dict[int, str]]:
         """Open the gateways, which close with the stack; return them, and each robot's address by its row."""
         static = world.static
@@ -172,6 +206,8 @@ class RunGateways:
                 names = static.robot_names[group.start : group.stop]
                 gateway = choice.gateway_class(names, group.body, choice.address, choice.options, clock)
                 gateway.separate = separate
+                if crazyradio and isinstance(gateway, CrazyflieGateway):
+                    gateway.join(crazyradio, group.start)
                 stack.callback(gateway.close)
                 gateway.enter(world.scene, group.start)
                 differences = gateway.differences()
@@ -180,6 +216,11 @@ class RunGateways:
                 addresses.update(zip(range(group.start, group.stop), gateway.open(), strict=True))
                 groups.append(GatewayGroup(group, choice.kind, gateway))
         return tuple(groups), addresses
+
+    def _crazyradio(self, static: Static) -> CrazyradioPorts:
+        station = new_polling(self._scenario.stations(), static.robots, 1).station.tolist()
+        drones = [row for row in range(static.robots) if station[row] != row]
+        return CrazyradioPorts({row: station[row] for row in drones})
 
     def _bridged_radio(self, static: Static) -> BridgedRadio | None:
         """Return the scenario's radio for agents behind gateways; None without a radio."""

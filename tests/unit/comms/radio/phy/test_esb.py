@@ -1,4 +1,4 @@
-"""Enhanced ShockBurst: a station polls drones in turn, with the timing of the nRF24L01+ specification."""
+"""Enhanced ShockBurst: a station polls drones in turn, with the timing of the nRF24LU1+ specification."""
 
 from dataclasses import replace
 
@@ -17,7 +17,8 @@ from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy.propagation import receiver_for, sensitivity_of
 from swarmwire.comms.radio.reception.receiver import chunk_success
 from swarmwire.comms.radio.timing import ESB
-from swarmwire.comms.robot.packets import SentPackets, TxResult
+from swarmwire.comms.robot.messages import CRTP_TAG
+from swarmwire.comms.robot.packets import Payloads, SentPackets, TxResult
 from tests.support.comms.radio import (
     RATE_HZ,
     SIZE_M,
@@ -193,11 +194,50 @@ def test_revived_station_polls_again():
     assert set((result.received("received_at_ns") // TICK_NS).tolist()) == {2, 3}
 
 
-@given(st.integers(0, 10_000), st.sampled_from([0.0, 0.3]), st.sampled_from([None, 0.002]), st.integers(0, 4))
-def test_fates_add_up_whatever_fails(seed: int, loss: float, queue_lifetime_s: float | None, queue_limit: int):
+def test_safelink_delivers_all_packets_once_and_in_order_through_losses():
+    """Of a poll and its answer 0.75 are lost, and 0.32 of exchanges have no answer."""
+    result = polled("2M", 2, 100, loss=0.5, access={"safelink": True})
+    for drone in (1, 2):
+        assert numbers_received(result, 0, drone) == list(range(100 * (drone - 1), 100 * drone))
+        assert numbers_received(result, drone, 0) == list(range(100))
+    assert result.fates() == {"RECEIVED": 400}
+
+
+def test_safelink_gives_up_after_100_exchanges_without_answer_until_there_is_one():
+    """100 exchanges with frames of 32 octets take 283 ms, so in the third tick; the second packet has only one."""
+    exchange_us = 32 + 130 + 4 * (FRAME_US["2M"] + ARD_US["2M"]) + 6
+    assert 2e5 < 99 * exchange_us < 1e-3 * 3 * TICK_NS
+    ids = {0: np.array([0]), 5: np.array([1])}
+    sent = {tick: replace(packets([0], [1], 32), tx_status_id=id_) for tick, id_ in ids.items()}
+    radio = crazyradio("2M", access={"safelink": True})
+    result = run(make_medium(radio, 2), at((0, 0), (1e6, 0)), lambda t: sent.get(t, SentPackets.none()), 6, 2)
+    assert result.fates() == {"OUT_OF_RANGE": 2}
+    assert [step.tx_status.id.tolist() for step in result.news] == [[], [], [], [0], [], [], [1], [], []]
+
+
+def test_tag_of_a_crtp_packet_is_not_on_air():
+    """31 octets of CRTP, the most that the Crazyflie has, and the tag: more than max_payload_bytes."""
+    payloads = Payloads.from_rows([CRTP_TAG.to_bytes(2, "little") + bytes(31)] * 5)
+    sent = SentPackets(np.zeros(5, np.int64), np.ones(5, np.int64), payloads)
+    result = run(make_medium(crazyradio("250k"), 2), np.zeros((2, 3)), lambda _: sent, 1, 30)
+    period_us = 31 + 260 + (57 + 16 + 8 * 31) / 0.25 + NULL_US["250k"] + 8.2
+    assert set(np.diff(result.received("received_at_ns")).tolist()) == {round(1e3 * period_us)}
+
+
+@given(
+    st.integers(0, 10_000),
+    st.sampled_from([0.0, 0.3]),
+    st.sampled_from([None, 0.002]),
+    st.integers(0, 4),
+    st.booleans(),
+)
+def test_fates_add_up_whatever_fails(
+    seed: int, loss: float, queue_lifetime_s: float | None, queue_limit: int, safelink: bool
+):
     """Robots die, radios are off; three arenas of five robots."""
     rng, rows = np.random.default_rng(seed), 15
-    radio = crazyradio("250k", loss=loss, queue_limit=queue_limit, queue_lifetime_s=queue_lifetime_s)
+    others = {"queue_limit": queue_limit, "queue_lifetime_s": queue_lifetime_s, "access": {"safelink": safelink}}
+    radio = crazyradio("250k", loss=loss, **others)
     states = dict[int, Disruption]()
     for tick in range(6):
         state = replace(Disruption.none(rows), alive=rng.random(rows) < 0.8, radio_on=rng.random(rows) < 0.8)

@@ -5,8 +5,9 @@
 
 import socket
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from selectors import EVENT_READ, DefaultSelector
 from threading import Lock, Thread
 from typing import Any, ClassVar
@@ -14,17 +15,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
-from swarmwire.comms.base.clock import DatedClock
+from swarmwire.comms.base.clock import NS_PER_S, DatedClock
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.crazyflie import LOGGED_SENSORS, POSITIONED_SENSORS, check_fits
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.world.gateways.crazyflie.flight import STANDSTILL, SupervisorState
+from swarmwire.world.gateways.crazyflie.radio import CrazyradioPorts
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
 from swarmwire.world.gateways.gateway import FRESH, ForeignCommands, Gateway
 
 WHERE = "gateway crazyflie"
 MAX_DATAGRAM_BYTES = 64  # longer datagrams are truncated, and still too long
+REOPEN_NS = NS_PER_S // 2  # a lost client's port stays closed for 0.5 to 1 s of simulated time
 NULL = b"\xff"  # null packet of a scan, which is no client
 
 
@@ -48,55 +51,92 @@ class CrazyflieServer:
     Attributes:
         addresses: host and port of each robot.
         lock: locked while a robot answers.
+        lost: number of links that `lose` ended.
         alive: (n,) True for robots that answer.
     """
 
-    def __init__(self, robots: Sequence[EmulatedCrazyflie], addresses: Sequence[tuple[str, int]]) -> None:
-        """BadInput if an address is in use or not permitted."""
-        self.robots = list(robots)
-        self.lock, self.alive = Lock(), [True] * len(robots)
+    def __init__(
+        self,
+        robots: Sequence[EmulatedCrazyflie],
+        addresses: Sequence[tuple[str, int]],
+        forward: Callable[[int, bytes], None] | None = None,
+    ) -> None:
+        """BadInput if an address is in use or not permitted.
+
+        `forward` gets the robot and each packet of a client, in place of the robot, which then answers to `answer`.
+        """
+        self.robots, self._forward = list(robots), forward
+        self.lock, self.alive, self.lost = Lock(), [True] * len(robots), 0
         self._sockets = _bound(addresses)
         self.addresses: list[tuple[str, int]] = [bound.getsockname()[:2] for bound in self._sockets]
         self._clients: list[tuple[str, int] | None] = [None] * len(robots)
+        self._scanners: dict[int, tuple[str, int]] = {}  # by robot: the newest sender of a null packet
+        self._closed: list[int] = []
+        self._reopened: list[int] = []
         self._end, self._ended = socket.socketpair()
+        self._selector = DefaultSelector()
+        for robot, bound in enumerate(self._sockets):
+            self._selector.register(bound, EVENT_READ, robot)
+        self._selector.register(self._ended, EVENT_READ, None)
         self._thread = Thread(target=self._serve, name="crazyflie gateway", daemon=True)
         self._thread.start()
 
-    def send(self, robot: int, datagrams: Sequence[bytes]) -> None:
-        """Send to the robot's client, if any."""
-        client = self._clients[robot]
-        if client is not None:
-            for datagram in datagrams:
-                with suppress(OSError):
-                    self._sockets[robot].sendto(datagram, client)
+    def send(self, robot: int, datagram: bytes) -> None:
+        """Send to the robot's client, if any; a null packet to the program that scans."""
+        to = self._scanners.pop(robot, None) if datagram == NULL else self._clients[robot]
+        if to is not None:
+            with suppress(OSError):
+                self._sockets[robot].sendto(datagram, to)
+
+    def answer(self, robot: int, datagram: bytes) -> bytes | None:
+        """Return the robot's answer to a packet; None without one, and if the robot is dead."""
+        with self.lock:
+            return self.robots[robot].receive(datagram) if self.alive[robot] else None
+
+    def lose(self, robot: int) -> None:
+        """Close the robot's port: a client that sends gets an error, as from cflib's driver when a link is lost."""
+        if self._clients[robot] is not None:
+            self._clients[robot], self.lost = None, self.lost + 1
+            self._selector.unregister(self._sockets[robot])
+            self._sockets[robot].close()
+            self._closed.append(robot)
+
+    def reopen(self) -> None:
+        """Open the ports that `lose` closed before the last call, except those that other programs have meanwhile."""
+        for robot in self._reopened:
+            try:
+                (self._sockets[robot],) = _bound([self.addresses[robot]])
+            except BadInput:
+                self._closed.append(robot)
+            else:
+                self._selector.register(self._sockets[robot], EVENT_READ, robot)
+        self._reopened, self._closed = self._closed, []
 
     def close(self) -> None:
         """Stop to answer, and free the addresses."""
         self._end.close()
         self._thread.join()
-        for each in (*self._sockets, self._ended):
+        for each in (self._selector, *self._sockets, self._ended):
             each.close()
 
     def _serve(self) -> None:
-        with DefaultSelector() as selector:
-            for robot, bound in enumerate(self._sockets):
-                selector.register(bound, EVENT_READ, robot)
-            selector.register(self._ended, EVENT_READ, None)
-            while True:
-                for key, _ in selector.select():
-                    if key.data is None:
-                        return
-                    self._answer(key.data)
+        while True:
+            for key, _ in self._selector.select():
+                if key.data is None:
+                    return
+                self._answer(key.data)
 
     def _answer(self, robot: int) -> None:
         with suppress(OSError):
             datagram, client = self._sockets[robot].recvfrom(MAX_DATAGRAM_BYTES)
-            with self.lock:
-                answer = self.robots[robot].receive(datagram) if self.alive[robot] else None
-            if datagram != NULL:
+            if datagram == NULL:
+                self._scanners[robot] = client
+            else:
                 self._clients[robot] = client
-            if answer is not None:
-                self._sockets[robot].sendto(answer, client)
+            if self._forward is not None:
+                self._forward(robot, datagram)
+            elif (answer := self.answer(robot, datagram)) is not None:
+                self.send(robot, answer)
 
 
 def _bound(addresses: Sequence[tuple[str, int]]) -> list[socket.socket]:
@@ -133,11 +173,22 @@ class CrazyflieGateway(Gateway):
         self._flew = np.zeros(len(self.names), np.bool_)  # flights in the last tick, whose end is a command, too
         self._motors_on = np.ones(len(self.names), np.bool_)  # state of the motors in the world
         self._server: CrazyflieServer | None = None
+        self._radio: CrazyradioPorts | None = None
+        self._first = self._reopen_ns = 0
+
+    def join(self, radio: CrazyradioPorts, first: int) -> None:
+        """Let all packets cross this radio, from `open` on; `first` is the row of the first robot."""
+        self._radio, self._first = radio, first
 
     def open(self) -> tuple[str, ...]:
         """See `Gateway.open`; the address is cflib's URI."""
-        self._server = CrazyflieServer(self._robots, self._addresses)
-        self._addresses = self._server.addresses
+        radio, first = self._radio, self._first
+        forward = self._forward if radio else None
+        server = self._server = CrazyflieServer(self._robots, self._addresses, forward)
+        self._addresses = server.addresses
+        if radio:
+            for i in range(len(self.names)):
+                radio.join(first + i, partial(server.answer, i), partial(server.send, i), partial(server.lose, i))
         return tuple(f"udp://{host}:{port}" for host, port in self._addresses)
 
     def publish(
@@ -157,8 +208,12 @@ class CrazyflieGateway(Gateway):
                 robot.sense(time_ns, {name: column[i] for name, column in fields.items()}) if self._alive[i] else []
                 for i, robot in enumerate(self._robots)
             ]
+        if time_ns >= self._reopen_ns:
+            self._reopen_ns = time_ns + REOPEN_NS
+            server.reopen()
         for i, datagrams in enumerate(logs):
-            server.send(i, datagrams)
+            for datagram in datagrams:
+                self._radio.send_up(self._first + i, datagram) if self._radio else server.send(i, datagram)
 
     def pop_commands(self) -> ForeignCommands:
         """See `Gateway.pop_commands`: the speeds of flying robots, and the stop of robots that have landed."""
@@ -190,13 +245,18 @@ class CrazyflieGateway(Gateway):
 
     def counts(self) -> dict[str, int]:
         """See `Gateway.counts`."""
-        return dict(self._counts)
+        lost = self._server.lost if self._server else 0
+        return {**self._counts, **({"links_lost": lost} if lost else {})}
 
     def close(self) -> None:
         """See `Gateway.close`."""
         server, self._server = self._server, None
         if server is not None:
             server.close()
+
+    def _forward(self, robot: int, datagram: bytes) -> None:
+        assert self._radio
+        self._radio.send_down(self._first + robot, datagram)
 
     def _new_robot(self) -> EmulatedCrazyflie:
         return EmulatedCrazyflie(self.body, self._counts)
