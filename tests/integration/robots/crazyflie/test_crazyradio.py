@@ -70,7 +70,7 @@ class Flight:
         self._opened = Event()
         self._thread = Thread(target=self._run, daemon=True)
         self._thread.start()
-        assert self._opened.wait(120.0)
+        assert self._opened.wait(600.0)  # kernels may have to be compiled
 
     def end(self) -> dict[str, int]:
         """End the run; return its counts."""

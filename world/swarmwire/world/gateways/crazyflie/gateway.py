@@ -95,7 +95,8 @@ class CrazyflieServer:
 
     def lose(self, robot: int) -> None:
         """Close the robot's port: a client that sends gets an error, as from cflib's driver when a link is lost."""
-        if self._clients[robot] is not None:
+        is_open = self._sockets[robot].fileno() >= 0  # a packet that is being read may set the client afterwards
+        if self._clients[robot] is not None and is_open:
             self._clients[robot], self.lost = None, self.lost + 1
             self._selector.unregister(self._sockets[robot])
             self._sockets[robot].close()
