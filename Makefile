@@ -19,11 +19,13 @@ help: ## list the commands
 
 .PHONY: demo
 demo: ## fly a flock over a lossy radio, a process per robot, and record it under runs/ with a picture
+	@echo "installing into .venv/, then a run of a minute; the first one compiles for half a minute before ..."
 	@.ci/sync --extra view
 	@run=runs/demo-$$(date -u +%Y%m%dT%H%M%SZ) && set -x && \
 		$(RUN) swarmwire run scenarios/flocking-lossy.toml --set duration_s=60 --runners per-robot --out $$run && \
 		$(RUN) swarmwire export $$run && { set +x; } 2>/dev/null && \
-		echo "see the picture: file://$$PWD/$$run/picture.png"
+		echo "see the picture: file://$$PWD/$$run/picture.png" && \
+		echo "put swarmwire on your PATH: make install; then: swarmwire view $$run"
 
 .PHONY: install
 install: ## put `swarmwire` and `swarmwire-agent` on your PATH; EXTRAS=tune,ui adds what needs more packages

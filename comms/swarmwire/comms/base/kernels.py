@@ -10,10 +10,12 @@ The word kernel stands for functions with the second decorator; all others with 
 
 numba's own cache compares only the file of a compiled function: after a change of a constant or of a function that it
 uses from elsewhere, earlier machine code would run on. Here the cache also compares everything that a function uses
-(`digest_of`) and the fields of the named tuples among its arguments.
+(`digest_of`) and the fields of the named tuples among its arguments. Where the machine code for this very CPU is not
+cached, that for `PORTABLE_CPU` is used if it is: it comes from an image or another machine (`kernel_archive.py`).
 
-This is the only module that imports numba. It changes the functions that it compiles, and nothing of numba itself:
-`numba.njit` in a user's code works as documented. It relies on PRIVATE_NAMES, so numba's minor version is pinned.
+This module and `kernel_archive.py` alone import numba. It changes the functions that it compiles, and nothing of numba
+itself: `numba.njit` in a user's code works as documented. It relies on PRIVATE_NAMES, so numba's minor version is
+pinned.
 """
 
 # pyright: reportUnknownMemberType=false, reportUnknownArgumentType=false, reportUnknownVariableType=false
@@ -23,6 +25,7 @@ from __future__ import annotations
 import fcntl
 import gc
 import hashlib
+import platform
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -34,8 +37,9 @@ from typing import Any, NoReturn, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import event
+from numba.core import config, event
 from numba.core.caching import FunctionCache
+from numba.core.codegen import get_host_cpu_features
 from numba.core.dispatcher import Dispatcher
 from numba.core.types import BaseNamedTuple, unliteral
 
@@ -48,9 +52,16 @@ PRIVATE_NAMES = {
         *("get_call_template", "get_overload", "overloads", "py_func", "targetoptions"),
     ),
     "FunctionCache": (*("_cache_path", "_index_key", "_py_func", "flush", "load_overload", "save_overload"),),
+    "IndexDataCacheFile": ("_load_data", "_load_index", "save"),  # in kernel_archive.py
     "BaseNamedTuple": ("fields", "types"),
     "options": ("_nrt", "forceinline", "no_cfunc_wrapper", "no_cpython_wrapper"),
 }
+
+# The CPU of machine code that other machines can use, as LLVM names it, by machine type: with AVX2, FMA and BMI2 on
+# x86-64, as all server processors since 2015 have. Results are the same bits for every CPU.
+PORTABLE_CPUS = {"x86_64": "x86-64-v3", "aarch64": "generic"}
+PORTABLE_CPU = PORTABLE_CPUS.get(platform.machine(), "generic")
+X86_64_V3 = ("avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2")
 
 COMPILE_EVENT = "numba:compile"  # numba does not raise it for a function that its cache has
 FOREIGN = {"numpy", "numba", *sys.stdlib_module_names}  # modules whose functions numba compiles by itself
@@ -162,43 +173,71 @@ class _Cache(FunctionCache):
         """`is_inner`: the version that compiled code calls, without the CPython wrapper."""
         super().__init__(function)
         self._options, self._is_inner = options, is_inner
+        self._is_portable = False  # whether the present search is for the portable CPU's machine code
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the machine code for a signature; None if there is none that is up to date."""
-        with self._locked():
+        with locked(Path(self._cache_path)):
             try:
-                return super().load_overload(sig, target_context)
+                loaded = super().load_overload(sig, target_context)
+                if loaded is None and self._portable_exists():
+                    self._is_portable = True
+                    loaded = super().load_overload(sig, target_context)
             except (AttributeError, ImportError):  # the entry names a class that was renamed or moved
                 self.flush()
                 return None
+            finally:
+                self._is_portable = False
+            return loaded
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Save the machine code of a signature."""
-        with self._locked():
+        with locked(Path(self._cache_path)):
             super().save_overload(sig, data)
 
-    @contextmanager
-    def _locked(self) -> Generator[None]:
-        """Keep other processes out of the folder.
-
-        numba writes the index before the machine code: without the lock, another process could load old code under the
-        new entry, or the code of another signature.
-        """
-        folder = Path(self._cache_path)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            lock = (folder / "kernels.lock").open("ab")
-        except OSError:  # nothing can be saved in this folder
-            yield
-            return
-        with lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            yield
+    def _portable_exists(self) -> bool:
+        """Return True if there is a file of the function, and this CPU, which was not chosen by hand, can run it."""
+        index = Path(self._cache_path, f"{self._impl.filename_base}.nbi")
+        return config.CPU_NAME is None and index.exists() and not missing_cpu_features()
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         """Return all that machine code depends on. numba's own key of a closure is another one in each process."""
         fields = tuple(_tuple_fields(kind) for kind in sig)
-        return sig, codegen.magic_tuple(), digest_of(self._py_func), repr(self._options), fields, self._is_inner
+        cpu: tuple[str, ...] = codegen.magic_tuple()
+        if self._is_portable:
+            cpu = (cpu[0], *PORTABLE_KEY)
+        return sig, cpu, digest_of(self._py_func), repr(self._options), fields, self._is_inner
+
+
+@contextmanager
+def locked(folder: Path) -> Generator[None]:
+    """Keep other processes out of a folder of cached machine code.
+
+    numba writes the index before the machine code: without the lock, another process could load old code under the
+    new entry, or the code of another signature.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / "kernels.lock").open("ab")
+    except OSError:  # nothing can be saved in this folder
+        yield
+        return
+    with lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+PORTABLE_KEY = (PORTABLE_CPU, "")  # name and further features, in the key of machine code
+PORTABLE_VARIABLES = {"NUMBA_CPU_NAME": PORTABLE_CPU, "NUMBA_CPU_FEATURES": ""}  # they make numba compile for it
+
+
+@cache
+def missing_cpu_features() -> tuple[str, ...]:
+    """Return the features of the portable CPU that this machine's lacks."""
+    if platform.machine() != "x86_64":
+        return ()
+    present = get_host_cpu_features().split(",")
+    return tuple(name for name in X86_64_V3 if f"+{name}" not in present)
 
 
 def _tuple_fields(kind: Any) -> Any:

@@ -2,8 +2,8 @@
 
 Dask's scheduler assigns tasks to workers, and reassigns those of a dead worker up to its `allowed-failures`; nannies
 replace dead workers. A worker plugin, which later workers get as well, checks code and versions, copies the scenario's
-files, and adds a resource that tasks need. So a worker that does not fit gets no task, and a fitting one has one task
-at a time, in a process that runs nothing else.
+files and what `swarmwire kernels build` has compiled here, and adds a resource that tasks need. So a worker that does
+not fit gets no task, and a fitting one has one task at a time, in a process that runs nothing else.
 """
 
 import asyncio
@@ -19,6 +19,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from tempfile import TemporaryDirectory
 from typing import Any, Protocol, cast
 from uuid import uuid4
 
@@ -32,6 +33,7 @@ from distributed.worker import WORKER_ANY_RUNNING, Worker
 
 from swarmwire.comms.base.clock import Clock, WallClock, to_ns
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
+from swarmwire.comms.base.kernel_archive import read_archive, write_archive
 from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.deploy.campaigns.schedule import OPTION, Finished
 from swarmwire.deploy.campaigns.worker import MAX_SILENCE_S, Task, TaskResult, run_task
@@ -46,6 +48,7 @@ CONNECT_S = 10.0
 CLOSE_S = 5.0
 NO_WORKER_S = 60.0  # longest time without a fitting worker
 PREPARE_S = 120.0  # timeout of the answers of all workers, which import swarmwire first
+KERNELS = "kernels.zip"  # among the files of a worker
 POLL_S = 5.0  # time between two polls of the workers
 MAX_MUTE_POLLS = 12  # consecutive polls without an answer, two minutes, after which the scheduler counts as lost
 Report = Callable[[str], None]
@@ -148,7 +151,7 @@ class DaskExecutor:
         modules = tuple(read_campaign(self._scenario.parent).modules)
         self._begun = True
         plugin: bytes = cast(Any, pickle).dumps(
-            Preparation(self._campaign, environment(modules), _files(self._scenario))
+            Preparation(self._campaign, environment(modules), _files(self._scenario) | _kernels())
         )
         call = self._client.scheduler.register_worker_plugin  # `Client.register_plugin` has no time limit
         try:
@@ -279,6 +282,13 @@ def _files(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
+def _kernels() -> dict[str, bytes]:
+    """Return an archive of the functions that `swarmwire kernels build` has compiled here; empty if it has not."""
+    with TemporaryDirectory() as folder:
+        archive = Path(folder, KERNELS)
+        return {KERNELS: archive.read_bytes()} if write_archive(archive) else {}
+
+
 @cache  # imported code does not change if its files are replaced
 def environment(modules: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return versions and digests of the code of this process: of these modules, by default of swarmwire's."""
@@ -315,6 +325,9 @@ class Preparation(WorkerPlugin):
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
+        if KERNELS in self._files:
+            with suppress(BadInput):  # an older processor, since versions and code are equal: it compiles for itself
+                await asyncio.to_thread(read_archive, folder / KERNELS)
         self.scenario = str(folder / SCENARIO)
         await worker.set_resources(**{self.name: 1})
         if worker.status == Status.running:  # dask assigns waiting tasks when a worker's status becomes running

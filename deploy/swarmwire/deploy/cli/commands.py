@@ -131,6 +131,11 @@ COMMANDS = {
         "ctl_events:ctl_app",
         "Watch and control running simulations: pause, step, speed, and events for their robots and radios.",
     ),
+    "kernels": CommandEntry(
+        NETWORK,
+        "kernels:kernels_app",
+        "Compiled functions: make them before the first run, and take them to other machines.",
+    ),
     "certs": CommandEntry(
         NETWORK,
         "certs:certs_app",

@@ -12,7 +12,7 @@ from swarmwire.comms.base.clock import Clock, WallClock, to_s
 from swarmwire.comms.base.kernels import compile_events
 
 FIRST_LINE_S = 2.0  # time of compiling before a line reports it
-LINE_INTERVAL_S = 10.0  # time from one line to the next
+LINE_INTERVAL_S = 5.0  # time from one line to the next
 COMPILING = "compiling kernels that this machine does not have yet: for a minute or so, then they are kept"
 
 

@@ -1,10 +1,12 @@
 """Campaigns on a dask cluster: the rows are those of this machine, whichever workers come, go or die meanwhile."""
 
+import asyncio
 import os
 import re
 import signal
 import socket
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
@@ -249,6 +251,20 @@ def test_worker_of_another_version_that_joins_later_is_left_out(tmp_path, refere
     assert "numpy is 1.0" in told[-1]
     assert len(rows) == 8
     assert len({row["machine_worker"] for row in rows}) == 1
+
+
+def test_worker_takes_the_functions_that_this_machine_has_compiled(tmp_path, monkeypatch):
+    taken = list[bytes]()
+    monkeypatch.setattr(dask, "read_archive", lambda path: taken.append(path.read_bytes()))
+
+    async def set_resources(**resources: int) -> None:
+        assert resources == {"campaign": 1}
+
+    worker = SimpleNamespace(
+        address="", local_directory=tmp_path, log_event=lambda *_: None, set_resources=set_resources, status=None
+    )
+    asyncio.run(dask.Preparation("campaign", dask.environment(), {dask.KERNELS: b"compiled"}).setup(worker))
+    assert taken == [b"compiled"]
 
 
 def test_scheduler_out_of_reach_is_one_line(caplog):

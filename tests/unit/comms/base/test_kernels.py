@@ -3,10 +3,13 @@
 import fcntl
 import gc
 import importlib
+import json
+import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
+from zipfile import ZipFile
 
 import numba
 import numpy as np
@@ -15,9 +18,11 @@ from numba.core import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.cpu import CPUTargetOptions
 from numba.core.dispatcher import Dispatcher
+from numba.core.registry import cpu_target
 
-from swarmwire.comms.base import draws_compiled
-from swarmwire.comms.base.kernels import PRIVATE_NAMES, compile_events, digest_of, kernel, njit
+from swarmwire.comms.base import draws_compiled, kernel_archive
+from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.kernels import PORTABLE_KEY, PRIVATE_NAMES, compile_events, digest_of, kernel, njit
 
 SOURCE = """
 from swarmwire.comms.base.kernels import kernel, njit
@@ -169,6 +174,62 @@ def test_machine_code_differs_for_other_tuples(modules, changed):
         assert module.first(module.Pair(a=1.0, b=2.0)) == 1.0
 
 
+@pytest.fixture
+def archive(modules, monkeypatch, tmp_path) -> Path:
+    """An archive of the module's functions, as if this machine's CPU were the portable one; the cache is empty then."""
+    codegen = type(cpu_target.target_context.codegen())
+    with monkeypatch.context() as elsewhere:
+        elsewhere.setattr(codegen, "magic_tuple", lambda _: ("triple", *PORTABLE_KEY))
+        modules.imported().plain(1.0)
+    monkeypatch.setattr(codegen, "magic_tuple", lambda _: ("triple", "other", "+feature"))
+    files = {name: tmp_path / name for name in ("kernels_made.py", "kernels_other.py")}
+    monkeypatch.setattr(kernel_archive, "sources", lambda: files)
+    kernel_archive._impl.cache_clear()
+    assert kernel_archive.write_archive(tmp_path / "kernels.zip") >= 2  # plain, and what it calls
+    shutil.rmtree(tmp_path / "machine-code")
+    return tmp_path / "kernels.zip"
+
+
+@needs_compiler
+def test_kernel_archive_spares_another_cpu_to_compile(modules, archive, monkeypatch):
+    assert kernel_archive.read_archive(archive) >= 2
+    compiled = modules.imported().plain
+    assert (compiled(1.0), hits(compiled)) == (113.0, 1)
+    monkeypatch.setattr(numba.config, "CPU_NAME", "chosen")  # by hand: its own functions, and no others
+    compiled = modules.imported().plain
+    assert (compiled(1.0), hits(compiled)) == (113.0, 0)
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("machine", "m68k"), ("cpu", "x86-64-v9"), ("python", "2.7"), ("numba", "0.1"), ("sources", {}), ("format", 0)],
+)
+def test_kernel_archive_of_another_machine_is_refused_with_the_key(archive, tmp_path, key, value):
+    with ZipFile(archive) as packed:
+        manifest = json.loads(packed.read("kernels.json"))
+    with ZipFile(tmp_path / "other.zip", "w") as packed:
+        packed.writestr("kernels.json", json.dumps({**manifest, key: value}))
+    with pytest.raises(BadInput) as refused:
+        kernel_archive.read_archive(tmp_path / "other.zip")
+    assert (refused.value.where, refused.value.key) == (str(tmp_path / "other.zip"), key)
+
+
+@needs_compiler
+def test_kernel_archive_is_refused_on_a_cpu_without_its_instructions(archive, monkeypatch):
+    monkeypatch.setattr(kernel_archive, "missing_cpu_features", lambda: ("avx2",))
+    with pytest.raises(BadInput, match="avx2"):
+        kernel_archive.read_archive(archive)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"PK"])
+def test_kernel_archive_that_is_none_is_refused(tmp_path, content):
+    if content is not None:
+        (tmp_path / "none.zip").write_bytes(content)
+    with pytest.raises(BadInput, match=r"none\.zip"):
+        kernel_archive.read_archive(tmp_path / "none.zip")
+
+
 def test_digest_ignores_comments(modules):
     before = digest_of(getattr(modules.imported().plain, "py_func", modules.imported().plain))
     modules.other = OTHER + "\n# a comment\n"
@@ -240,6 +301,7 @@ def test_numba_has_all_private_names() -> None:
     owners = {
         "Dispatcher": compiled,
         "FunctionCache": cache,
+        "IndexDataCacheFile": IndexDataCacheFile,
         "BaseNamedTuple": types.NamedTuple((types.int64,), Single),
         "options": CPUTargetOptions,
     }
