@@ -13,7 +13,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.ros2.keys import RADIO_TOPICS, check_name
 from swarmwire.comms.protocols.ros2.relay import PART
 from swarmwire.comms.radio.config.antennas import check_pattern
-from swarmwire.comms.radio.config.radio import Radio, check_radio, unfit_for_torus
+from swarmwire.comms.radio.config.radio import Radio, check_radio, check_spreading, unfit_for_torus
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.world.actuation.actuators import noise_of
 from swarmwire.world.engines.physics import check_engines, engines_of
@@ -92,6 +92,8 @@ def _check_antennas(scenario: Scenario, where: str) -> None:
             raise BadInput(where, f"robots.{group}.radio", f"expected a radio with a PHY: {reason}")
         if table.radio is not None:
             check_pattern(table.radio.pattern, where, f"robots.{group}.radio.pattern")
+        if scenario.radio is not None and table.radio is not None and table.radio.spreading_factor is not None:
+            check_spreading(scenario.radio, table.radio.spreading_factor, where, f"robots.{group}.radio")
 
 
 def _check_station(scenario: Scenario, where: str) -> None:

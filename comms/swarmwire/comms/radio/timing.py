@@ -206,14 +206,14 @@ CAD_HANDLING_NS = 7_600 * US  # propagation over 30 km, turnaround and processin
 def lora_cad(symbol_ns: int, turnaround_ns: int) -> UnslottedCsma:
     """Return the access of Meshtastic: U{0 .. 2^CW - 1} slots, then channel activity detection (CAD), until it is idle.
 
-    A slot is 2.25 symbols and 7.6 ms. CW is 3 and grows to 8, by one with each busy CAD; Meshtastic takes it from the
-    channel's utilisation in the last minute (firmware 2.7, RadioInterface.cpp). A CAD detects frames that a receiver
-    could decode.
+    A slot is 2.5 symbols, the longest CAD of its chips, and 7.6 ms; a CAD of an SX127x takes 2.25. CW is 3 and grows to
+    8, by one with each busy CAD; Meshtastic takes it from the utilisation of the channel in the last minute (firmware
+    2.7.15, RadioInterface.cpp). A CAD detects frames that a receiver could decode.
     """
     cad_ns = CAD_QUARTER_SYMBOLS * symbol_ns // 4
     return UnslottedCsma(
         symbol_ns=symbol_ns,
-        backoff_ns=cad_ns + CAD_HANDLING_NS,
+        backoff_ns=5 * symbol_ns // 2 + CAD_HANDLING_NS,
         cca_ns=cad_ns,
         cca_ed_above_sensitivity_db=0.0,
         turnaround_ns=turnaround_ns,

@@ -8,15 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarmwire.comms.radio.config.antennas import RobotAntenna
 from swarmwire.comms.radio.config.frames import airtime_ns
 from swarmwire.comms.radio.config.lora import Lora
 from swarmwire.comms.radio.config.phy import Access
-from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.config.radio import Radio, check_spreading
 from swarmwire.comms.radio.phy.propagation import sensitivity_of
 from swarmwire.comms.radio.timing import lora_ns, lora_symbol_ns
 from swarmwire.comms.robot.packets import Fate
 from tests.support.comms.radio import Run, at, make_medium, packets, run
 from tests.support.refusals import refused_input
+from tests.unit.comms.radio.test_antennas import medium_of
 from tests.unit.world.scenario.test_bodies import radio_of
 
 PAIR = at((0, 0), (1, 0))
@@ -149,6 +151,49 @@ def test_lora_robot_receives_nothing_while_it_sends():
     assert result.fates() == {"COLLIDED": 2}
 
 
+def test_lora_robots_receive_frames_of_their_spreading_factor_alone():
+    """14 octets: 46.336 ms at SF7, 164.864 ms at SF9; see the airtime tests for the formula."""
+    groups = [None, None, RobotAntenna(spreading_factor=9), RobotAntenna(spreading_factor=9)]
+    pose = at((0, 0), (10, 0), (0, 10), (10, 10))
+    result = run(medium_of(lora(), groups), pose, lambda tick: packets([0] if tick == 0 else [2]), 2, 10)
+    assert sorted(result.rows("received", "sender_index", "receiver")) == [(0, 1), (2, 3)]
+    assert result.fates() == {"RECEIVED": 2, "OUT_OF_RANGE": 4}
+    ends_ns = dict(zip(result.finished("sender"), result.finished("final_at_ns"), strict=True))
+    assert ends_ns[0] == 46_336_000
+    assert ends_ns[2] == 100_000_000 + 164_864_000
+    assert result.edges.tolist() == [[0, 1], [2, 3]]
+
+
+@pytest.mark.parametrize(
+    ("signal", "interferer", "least_sir_db"),
+    # Croce et al. 2018, table II, as also in FLoRa's LoRaReceiver.h.
+    [(7, 10, -9), (7, 12, -9), (8, 11, -13), (9, 12, -15), (10, 7, -19), (11, 8, -22), (12, 7, -25), (12, 9, -25)],
+)
+def test_lora_frame_survives_another_spreading_factor_down_to_its_co_channel_rejection(
+    signal: int, interferer: int, least_sir_db: int
+):
+    """The longer frame begins 0.2 s before the other; exponent 3 beyond 1 m."""
+    groups = [None if sf == 7 else RobotAntenna(spreading_factor=sf) for sf in (signal, signal, interferer)]
+    first, second = ([1], [2]) if signal > interferer else ([2], [1])
+    sent = {0: packets(first, 0), 2: packets(second, 0)}
+    for margin_db, fate in ((0.1, "RECEIVED"), (-0.1, "COLLIDED")):
+        pose = at((0, 0), (20, 0), (-20 * 10 ** ((least_sir_db + margin_db) / 30), 0))
+        result = run(medium_of(lora(), groups), pose, lambda tick: sent.get(tick, packets([])), 3, 30)
+        assert fates_by_sender(result) == {1: fate}
+
+
+@pytest.mark.parametrize("sf", [8, 12])
+def test_lora_group_has_the_sensitivity_of_its_spreading_factor_and_measures_the_power(sf: int):
+    """At 10 m the loss is 61.2192 dB, see above."""
+    for margin_db, fate in ((0.1, "RECEIVED"), (-0.1, "OUT_OF_RANGE")):
+        strength_dbm = sensitivity_of(lora(spreading_factor=sf)) + margin_db
+        radio = lora(antenna={"power_dbm": strength_dbm + 61.2192}, measures={"rssi": {}})
+        groups = [RobotAntenna(spreading_factor=sf)] * 2
+        result = run(medium_of(radio, groups), at((0, 0), (10, 0)), lambda _: packets([0]), 1, 30)
+        assert result.fates() == {fate: 1}
+        np.testing.assert_allclose(result.measured("rssi_dbm"), strength_dbm, atol=0.01)
+
+
 def test_channel_activity_detection_spares_what_aloha_loses():
     """12 in one spot, each 20 frames of 46 ms in 10 s: an offered load of 1.1."""
     delivered = {}
@@ -220,3 +265,17 @@ def test_us915_frames_of_255_bytes_last_at_most_the_dwell_time():
 def test_unfit_lora_keys_are_refused(keys: dict[str, Any], key: str):
     with refused_input(key=key):
         radio_of({"preset": "lora-eu868", **keys})
+
+
+@pytest.mark.parametrize(
+    ("keys", "key"),
+    [
+        ({"preset": "ieee802154"}, "robots.scouts.radio.spreading_factor"),
+        ({"access": {"method": "cad"}}, "robots.scouts.radio.spreading_factor"),
+        ({"preset": "lora-us915"}, "radio.max_payload_bytes"),
+    ],
+)
+def test_unfit_spreading_factors_of_groups_are_refused(keys: dict[str, Any], key: str):
+    radio = radio_of({"preset": "lora-eu868", **keys})
+    with refused_input(key=key):
+        check_spreading(radio, 9, "scenario.toml", "robots.scouts.radio")

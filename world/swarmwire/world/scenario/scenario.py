@@ -71,7 +71,7 @@ class RobotsTable(ScenarioTable):
     params: dict[str, Any] = Field(default_factory=dict)
     """The agent's parameters."""
     radio: Annotated[RobotAntenna, AsTable()] | None = None
-    """Power, gain and pattern of the group's antennas; only for a radio with a PHY."""
+    """Antenna and spreading factor of the group's radios; only for a radio with a PHY."""
     place: PlacementTable = InArena(how="arena")
     """Poses of the robots at the start."""
     motion: MotionTable | None = None

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
 
@@ -104,7 +104,7 @@ class Antenna:
 
 @dataclass(frozen=True)
 class RobotAntenna:
-    """Antennas of a group's robots where they differ from `[radio.antenna]`."""
+    """Radios of a group's robots where they differ from `[radio.antenna]` and `[radio.lora]`."""
 
     power_dbm: float | None = parameter(
         None, help="transmit power into the antenna", unit="dBm", at_least=-100, at_most=100
@@ -113,10 +113,14 @@ class RobotAntenna:
         None, help="gain of the antenna, when sending and when receiving", unit="dBi", at_least=-100, at_most=100
     )
     pattern: Pattern | None = parameter(None, help="gain by direction, in place of that of the radio")
+    spreading_factor: int | None = parameter(
+        None, help='frame "lora" only: in place of that of the radio', at_least=7, at_most=12
+    )
 
     def or_default(self, antenna: Antenna) -> Antenna:
         """Return the antenna of the group's robots; `antenna` is the radio's."""
         changes = {name: value for name, value in vars(self).items() if value is not None}
+        changes.pop("spreading_factor", None)
         return replace(antenna, **changes)
 
 
@@ -141,6 +145,10 @@ class Antennas:
     def by_group(self, antenna: Antenna) -> list[Antenna]:
         """Return the antenna of each group; `antenna` is the radio's."""
         return [group.or_default(antenna) for group in self.groups]
+
+    def spreading_factors(self, default: int) -> IntArray:
+        """Spreading factor of each robot, (robots,); `default` is the radio's."""
+        return np.repeat(np.array([group.spreading_factor or default for group in self.groups], np.int64), self.counts)
 
     def send_dbm(self, antenna: Antenna) -> FloatArray:
         """Power that each robot radiates in its main direction, (robots,); `antenna` is the radio's."""

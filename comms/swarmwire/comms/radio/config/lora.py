@@ -16,6 +16,17 @@ from swarmwire.comms.radio.timing import Octets, lora_ns, lora_symbol_ns
 BANDWIDTHS_HZ = (125_000, 250_000, 500_000)
 CODING_RATES = ("4/5", "4/6", "4/7", "4/8")
 SNR_LIMIT_DB = {7: -7.5, 8: -10.0, 9: -12.5, 10: -15.0, 11: -17.5, 12: -20.0}  # SX1276 data sheet, rev. 7, table 13
+SPREADING_FACTORS = range(7, 13)
+# Least SIR of a frame (row: SF7 to SF12) with one of another spreading factor (column) on air: Croce et al. 2018, table
+# II, measured with an SX1272 at 125 kHz. Equal ones have CAPTURE_DB here, 1 dB there.
+MIN_SIR_DB = (
+    (6, -8, -9, -9, -9, -9),
+    (-11, 6, -11, -12, -13, -13),
+    (-15, -13, 6, -13, -14, -15),
+    (-19, -18, -17, 6, -17, -18),
+    (-22, -22, -21, -20, 6, -20),
+    (-25, -25, -25, -24, -23, 6),
+)
 CAPTURE_DB = 6.0  # a frame survives others of its spreading factor if it is so much stronger (Bor et al. 2016)
 LOCKING_SYMBOLS = 5  # of the preamble, without which a receiver does not lock (Bor et al. 2016)
 MAX_LEAD_SYMBOLS = 3

@@ -319,6 +319,18 @@ def _check_lora(radio: Radio, where: str) -> None:
     refuse_unfit_lora(lora, radio.overhead_bytes, radio.max_payload_bytes, where)
 
 
+def check_spreading(radio: Radio, spreading_factor: int, where: str, key: str) -> None:
+    """Raise BadInput if robots cannot have this spreading factor; `key` is that of their radio."""
+    lora = radio.lora_or_none
+    if lora is None:
+        raise BadInput(where, f"{key}.spreading_factor", f'expected frame = "lora" with it, got "{radio.frame}"')
+    if radio.access_or_default.method == "cad" and spreading_factor != lora.spreading_factor:
+        expected = f"expected {lora.spreading_factor}, that of the radio, with access method cad"
+        raise BadInput(where, f"{key}.spreading_factor", f"{expected}; got {spreading_factor}")
+    lora = replace(lora, spreading_factor=spreading_factor)
+    refuse_unfit_lora(lora, radio.overhead_bytes, radio.max_payload_bytes, where)
+
+
 def _check_interface(radio: Radio, interface: Interface, where: str) -> None:
     try:
         network = IPv4Network(interface.network)

@@ -41,18 +41,17 @@ class JammerTable:
         """True if there are jammers."""
         return len(self._jammers.arena) > 0
 
-    def move(self, pose: FloatArray, propagation: PropagationParams, despreading_db: float) -> None:
+    def move(self, pose: FloatArray, propagation: PropagationParams, despreading: FloatArray) -> None:
         """Recompute the powers for robots at `pose` (rows, 4) and the jammers of the active disruption.
 
-        The detector takes `despreading_db` off each.
+        The detectors divide each by `despreading` (robots,).
         """
         self._jammers = self._context.disruption.jammers
         if not self.anything:
             self._power_mw = np.empty((0, self._context.robots))
             return
-        self._power_mw = powers_of(
-            self._jammers, pose, self._context.robots, self._context.obstacles.now(), propagation
-        ) * from_db(-despreading_db)
+        power_mw = powers_of(self._jammers, pose, self._context.robots, self._context.obstacles.now(), propagation)
+        self._power_mw = power_mw / despreading
 
     def between(self, from_ns: int, until_ns: int) -> JammerSchedule:
         """Return the state of jammers before `from_ns`, and their switching times in [`from_ns`, `until_ns`)."""

@@ -18,12 +18,11 @@ from swarmwire.comms.base.sentinels import NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.phy.pairs import MeasuredLinks, Pairs, pairs_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams
+from swarmwire.comms.radio.phy.spreading import OMITTED, STRONG, WEAK, Spreading
 from swarmwire.comms.radio.phy.state import LINK, SILENT, LinkRanges
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.stages.blocking import LineOfSight, end_disrupted
 from swarmwire.comms.robot.packets import Fate
-
-OMITTED, WEAK, STRONG = range(3)
 
 
 class Thresholds(NamedTuple):
@@ -41,16 +40,20 @@ def links_by_sender(
     fate: SignedByteArray,
     thresholds: Thresholds,
     on_air: Table,
+    spreading: Spreading | None = None,
 ) -> tuple[Table, LinkRanges]:
     """Return the links of `pairs` in both directions, after links `on_air`, and their ranges by sender.
 
     `send_dbm` and `receive_dbi` (rows,) include the effect of events. `fate` (2, k) is UNDER_WAY for open links of
-    pair i, from a to b and from b to a.
+    pair i, from a to b and from b to a. `spreading` is that of robots with different spreading factors.
     """
     k, rows = len(pairs.a), len(send_dbm)
     kind, power_mw, counts = np.empty((2, k), np.uint8), np.empty((2, k)), np.zeros((rows, 3), np.int64)
     is_symmetric, antenna_gains = pairs.reverse_db is pairs.loss_db, np.empty((2, rows))
     _find_kinds(kind, power_mw, counts, antenna_gains, pairs, is_symmetric, send_dbm, receive_dbi, fate, thresholds)
+    if spreading is not None:
+        interferes = thresholds.interference_dbm < np.inf
+        spreading.separate(kind, power_mw, counts, pairs.a, pairs.b, fate, interferes)
     per_robot = counts[:, WEAK] + counts[:, STRONG]
     before, stop = len(on_air), np.cumsum(per_robot) + len(on_air)
     first = stop - per_robot
@@ -135,10 +138,11 @@ class LinkTable:
         propagation: PropagationParams,
         thresholds: Thresholds,
         measured: MeasuredLinks | None,
+        spreading: Spreading | None = None,
     ) -> None:
         """`measured` holds the links of the radio's trace; the caller keeps it up to date."""
         self._context, self._line_of_sight, self._measured = context, LineOfSight.create(context), measured
-        self.propagation, self._thresholds = propagation, thresholds
+        self.propagation, self._thresholds, self._spreading = propagation, thresholds, spreading
         rows = len(context.keys) * context.robots
         self.pose = np.zeros((rows, 4))
         # Obstacles may be pushed, and measured strengths change by themselves.
@@ -180,9 +184,9 @@ class LinkTable:
         forward, reverse = send_dbm[pairs.a] + receive_dbi[pairs.b], send_dbm[pairs.b] + receive_dbi[pairs.a]
         return forward - pairs.loss_db, reverse - pairs.reverse_db
 
-    def tune(self, propagation: PropagationParams, thresholds: Thresholds) -> None:
+    def tune(self, propagation: PropagationParams, thresholds: Thresholds, spreading: Spreading | None = None) -> None:
         """Use these parameters from the next `move` on."""
-        self.propagation, self._thresholds, self._is_new = propagation, thresholds, True
+        self.propagation, self._thresholds, self._spreading, self._is_new = propagation, thresholds, spreading, True
 
     def move(self, pose: FloatArray, robot: Table, reception: Table) -> None:
         """Rebuild the links for robots at `pose`, and update the link rows in tables of dtype ROBOT and RECEPTION.
@@ -214,9 +218,8 @@ class LinkTable:
         if disruption.is_active:
             end_disrupted(disruption.cuts, fate[0], pairs.a, pairs.b)
             end_disrupted(disruption.cuts, fate[1], pairs.b, pairs.a)
-        return links_by_sender(
-            pairs, self.propagation.send_dbm, self.propagation.receive_dbi, fate, self._thresholds, on_air
-        )
+        antennas = self.propagation.send_dbm, self.propagation.receive_dbi
+        return links_by_sender(pairs, *antennas, fate, self._thresholds, on_air, self._spreading)
 
     def _links_on_air(self, robot: Table, reception: Table) -> Table:
         """Return the links of frames on air; updates their rows in `robot` and `reception`."""

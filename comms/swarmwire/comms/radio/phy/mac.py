@@ -79,7 +79,8 @@ def send(params, state, events, buffer, r, now_ns):
         results.record_last_attempt(state, buffer, r, now_ns)
         tx_queue.wait_interframe(params, state, events, r, packet.ifs_ns, now_ns)
         return
-    packet.on_air_at_ns = now_ns - params.lead_ns
+    lead_ns = params.lead_ns[r % params.robots]
+    packet.on_air_at_ns = now_ns - lead_ns
     robot.mac_state = SENDING
     if state.switch.is_on[r]:
         use_current_links(state, r)
@@ -90,7 +91,7 @@ def send(params, state, events, buffer, r, now_ns):
     robot.rate = params.data_rate if packet.to != BROADCAST else params.broadcast_rate
     robot.duration_ns = params.data_duration_ns if packet.to != BROADCAST else 0
     duty_cycle.spend(params, state, r, packet.airtime_ns, packet.on_air_at_ns)
-    reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns - params.lead_ns, packet.bits)
+    reception.start_frame(params, state, events, r, now_ns, packet.airtime_ns - lead_ns, packet.bits)
 
 
 @kernel()

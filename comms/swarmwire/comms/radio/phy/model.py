@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray, Table
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, UNDER_WAY
@@ -31,6 +32,7 @@ from swarmwire.comms.radio.phy.pairs import MeasuredLinks
 from swarmwire.comms.radio.phy.params import phy_params_of, thresholds_of
 from swarmwire.comms.radio.phy.propagation import PropagationParams, propagation_params_of
 from swarmwire.comms.radio.phy.results import ResultBuffer, joined_rows, result_buffer
+from swarmwire.comms.radio.phy.spreading import spreading_of
 from swarmwire.comms.radio.phy.state import IDLE, PACKET, SILENT, PhyState, RadioSwitches, idle_receptions, idle_robots
 from swarmwire.comms.radio.stages.chain import after_reception, stages_after
 from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
@@ -52,7 +54,7 @@ class Reporter:
 
     def tune(self, context: ChannelContext) -> None:
         """Use the radio parameters of `context` from now on."""
-        self._stages = stages_after(context)
+        self._stages, self._spreading = stages_after(context), spreading_of(context.radio, context)
 
     def report(self, parts: list[ResultBuffer], queued: PacketTable, poses: Poses, liveness: LivenessHistory) -> None:
         """Append packets and links of the result rows in `parts`, which are rows of `queued`."""
@@ -67,6 +69,9 @@ class Reporter:
             *(queued.queued.table, queued.queued.data, queued.table, buffer, is_intended),
             *(packets.table, packets.data, packets.used, links.table, links.used),
         )
+        if self._spreading is not None:
+            received = links.rows[first_link : first_link + len(pose_id)]
+            received["rssi_dbm"] -= self._spreading.gain_db[received["receiver"]]
         new = packets.rows[first_packet:]
         if np.count_nonzero(new["fate"] != UNDER_WAY):
             links.rows["in_range"][first_link + len(pose_id) :] = self._count_in_range(new, liveness)
@@ -118,11 +123,12 @@ class SinrPhy(RadioModel):
     def __init__(self, context: ChannelContext, packets: Transmissions, links: Links) -> None:
         self._context, self._radio = context, context.radio
         rows = len(context.keys) * context.robots
-        self._params = phy_params_of(context.radio, context.robots)
+        self._spreading = spreading_of(context.radio, context)
+        self._params = phy_params_of(context.radio, context.robots, self._spreading)
         self._measured, self._losses = MeasuredLinks.create(context), LossChain.create(context)
         thresholds = thresholds_of(context.radio, self._params)
-        self._links = LinkTable(context, self._propagation_params(), thresholds, self._measured)
-        self._jam, self._was_jammed = JammerTable(context), False
+        self._links = LinkTable(context, self._propagation_params(), thresholds, self._measured, self._spreading)
+        self._jam, self._was_jammed, self._despreading = JammerTable(context), False, self._despreading_gains()
         self._graph = RadioGraph(context, self._params, self._links, self._jam, self._losses)
         self._reports = Reporter(context, self._links, packets, links)
         self._events = event_queue(rows)
@@ -162,9 +168,9 @@ class SinrPhy(RadioModel):
             self._measured.move_to(self._now_ns)
         now = self._context.disruption
         if not all(map(np.array_equal, self._gains, (now.send_gain_db, now.receive_gain_db))):
-            self._links.tune(self._propagation_params(), thresholds_of(self._radio, self._params))
+            self._links.tune(self._propagation_params(), thresholds_of(self._radio, self._params), self._spreading)
         self._links.move(pose, self._robot, self._reception)
-        self._jam.move(pose, self._links.propagation, self._radio.despreading_db)
+        self._jam.move(pose, self._links.propagation, self._despreading)
         if self._jam.anything or self._was_jammed:
             self._refresh()
         self._was_jammed = self._jam.anything
@@ -177,7 +183,9 @@ class SinrPhy(RadioModel):
         """Use the parameters of `radio` from `at_ns` on; chunks received before keep the old parameters."""
         self._refresh()
         context = replace(self._context, radio=radio)
-        self._radio, self._params = radio, phy_params_of(radio, self._context.robots)
+        self._radio, self._spreading = radio, spreading_of(radio, context)
+        self._params = phy_params_of(radio, self._context.robots, self._spreading)
+        self._despreading = self._despreading_gains()
         self._frames = frames_of(radio)
         self._esb_timing = self._esb_timing and esb.esb_timing(radio)
         if not len(self._spent.minute):
@@ -185,15 +193,18 @@ class SinrPhy(RadioModel):
         self._losses.tune(context, at_ns)
         self._graph.tune(radio, self._params)
         self._reports.tune(context)
-        self._links.tune(self._propagation_params(), thresholds_of(radio, self._params))
+        self._links.tune(self._propagation_params(), thresholds_of(radio, self._params), self._spreading)
         self._refresh()
 
     def accept(
         self, sent_at_ns: IntArray, sent: SentPackets, others_alive: IntArray, epoch: int, counts: AnyArray
     ) -> int:
         """Queue packets; events decide when they go on air."""
-        self._is_new, self._next_ns = True, 0
-        return self._packets.accept(sent_at_ns, sent, others_alive, epoch, counts, self._frames)
+        self._is_new, self._next_ns, before = True, 0, len(self._packets)
+        result = self._packets.accept(sent_at_ns, sent, others_alive, epoch, counts, self._frames)
+        if self._spreading is not None:
+            self._spreading.set_airtimes(self._packets.table[before:])
+        return result
 
     def pass_time(self, until_ns: int, liveness: LivenessHistory) -> None:
         """Handle the events due before `until_ns`."""
@@ -262,12 +273,21 @@ class SinrPhy(RadioModel):
     def edges(self, pose: FloatArray, alive: BoolArray) -> IntArray:
         """Return the edges of the radio graph, robot rows a < b, sorted, (e, 2)."""
         edges = self._graph.edges(pose, alive, self._poses_from_ns)
+        if self._spreading is not None:
+            edges = edges[self._spreading.are_equal(edges[:, 0], edges[:, 1])]
         return edges if self._polling is None else edges[esb.are_linked(self._polling, edges[:, 0], edges[:, 1])]
 
     def _propagation_params(self) -> PropagationParams:
         now = self._context.disruption
         self._gains = now.send_gain_db.copy(), now.receive_gain_db.copy()
         return propagation_params_of(self._radio, self._context)
+
+    def _despreading_gains(self) -> FloatArray:
+        """Return what the detector of each robot of an arena divides jammers by, (robots,)."""
+        gain_db = np.full(self._context.robots, self._radio.despreading_db)
+        if self._spreading is not None:
+            gain_db += self._spreading.gain_db[: len(gain_db)]
+        return portable.power(10.0, 0.1 * gain_db)
 
     def _refresh(self) -> None:
         """Recompute the noise of all robots, before or after a change of its sources."""

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.radio.config.frames import (
     acknowledgement_bytes,
@@ -21,6 +21,7 @@ from swarmwire.comms.radio.phy.duty_cycle import allowance_ns
 from swarmwire.comms.radio.phy.ht.params import HT_RATES_BPS, HtParams, ht_params_of
 from swarmwire.comms.radio.phy.link_table import Thresholds
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, sensitivity_of
+from swarmwire.comms.radio.phy.spreading import Spreading
 from swarmwire.comms.radio.phy.success import log_success_table
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.reception.receiver import Receiver, receiver_of, sinr_for_db
@@ -42,7 +43,7 @@ class PhyParams(NamedTuple):
     min_preamble_sinr: float  # lowest SINR of a detected preamble
     min_preamble_mw: float  # lowest power of a detected preamble
     error_free_sinr: float  # least SINR at which no bit is wrong
-    lead_ns: int  # start of a frame that neither disturbs others nor is disturbed
+    lead_ns: IntArray  # (robots,) start of a frame that neither disturbs others nor is disturbed
     allowance_ns: int  # airtime of a robot within an hour
     capture_window_ns: int  # time after a frame's start in which a stronger frame can capture the receiver
     cca_ed_mw: float  # CCA energy detection threshold
@@ -77,8 +78,8 @@ class PhyParams(NamedTuple):
     ht: HtParams | None  # only of radios of 802.11n
 
 
-def phy_params_of(radio: Radio, robots: int) -> PhyParams:
-    """Return the PHY parameters of a radio; each arena has `robots` robots."""
+def phy_params_of(radio: Radio, robots: int, spreading: Spreading | None = None) -> PhyParams:
+    """Return the PHY parameters of a radio; each arena has `robots` robots, which may have different `spreading`."""
     reception, access = radio.reception_or_default, radio.access_or_default
     receiver = receiver_of(reception, radio.bit_rate_bps)
     lora, method = radio.lora_or_none, access.method
@@ -119,7 +120,7 @@ def phy_params_of(radio: Radio, robots: int) -> PhyParams:
         min_preamble_sinr=float(from_db(reception.preamble_sinr_db)),
         min_preamble_mw=float(from_db(reception.preamble_dbm)),
         error_free_sinr=float(from_db(sinr_for_db(receiver, CERTAIN, max_bits))),
-        lead_ns=lead_ns,
+        lead_ns=np.full(robots, lead_ns) if spreading is None or lead_ns == 0 else spreading.lead_ns,
         allowance_ns=allowance_ns(radio),
         capture_window_ns=to_ns(reception.capture_window_s),
         cca_ed_mw=float(from_db(cca_threshold_dbm)),

@@ -15,6 +15,7 @@ from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS, Lo
 from swarmwire.comms.radio.config.phy import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
+from swarmwire.comms.radio.phy.spreading import spreading_of
 from swarmwire.comms.radio.propagation.antennas import AntennaPatterns, antenna_patterns
 from swarmwire.comms.radio.propagation.fading import FadingModel, fading_model, scatter_waves
 from swarmwire.comms.radio.propagation.path_loss import lifted, reach_m
@@ -149,8 +150,13 @@ def _reach_m(curve: LossCurve, max_loss_db: float, range_m: float) -> float:
 
 
 def _antennas_of(radio: Radio, context: ChannelContext) -> tuple[FloatArray, FloatArray]:
-    """Return radiated power in dBm and receive gain in dBi of each robot, with the gains of events, (rows,) each."""
+    """Return radiated power in dBm and receive gain in dBi of each robot, with the gains of events, (rows,) each.
+
+    The receive gain contains the despreading gain of robots with a spreading factor of their own.
+    """
     antennas, antenna, disruption = context.antennas, radio.antenna_or_default, context.disruption
     arenas = len(context.keys)
     send_dbm = np.tile(antennas.send_dbm(antenna), arenas) + disruption.send_gain_db
-    return send_dbm, np.tile(antennas.receive_dbi(antenna), arenas) + disruption.receive_gain_db
+    receive_dbi = np.tile(antennas.receive_dbi(antenna), arenas) + disruption.receive_gain_db
+    spreading = spreading_of(radio, context)
+    return send_dbm, receive_dbi if spreading is None else receive_dbi + spreading.gain_db

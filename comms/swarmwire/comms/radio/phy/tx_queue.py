@@ -122,9 +122,10 @@ def begin_attempt(params, state, events, r, now_ns):
         dcf.request_access(params, state, events, r, now_ns)
     else:
         robot.mac_state = BACKING_OFF
-        if params.lead_ns > 0:
+        lead_ns = params.lead_ns[r % params.robots]
+        if lead_ns > 0:
             reception.stop_receiving(state, r)
-        schedule(events, SEND, r, now_ns + params.lead_ns)
+        schedule(events, SEND, r, now_ns + lead_ns)
 
 
 @kernel()

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,11 @@ def probe_coverage(
         raise BadInput("--bytes", "", f"expected 0 to {most}, which the radio takes; got {payload_bytes}")
     payload_bytes = most if payload_bytes is None else payload_bytes
     key = world.keys[0]
-    sender = None if position_m is not None else _antenna_of(radio, plan.scenario, _index(static, robot))
+    sender = None
+    if position_m is None:
+        index = _index(static, robot)
+        sender = _antenna_of(radio, plan.scenario, index)
+        radio = _with_spreading_factor(radio, plan.scenario, index)
     obstacles = ObstacleIndices(obstacle_arrays(static.obstacles[:1]), size_m, 0.0)
     coverage = RadioCoverage(radio, key, obstacles, payload_bytes, sender)
     heading_rad = float(start[2]) if position_m is None else None
@@ -96,6 +100,15 @@ def _antenna_of(radio: Radio, scenario: Scenario, index: int) -> Antenna:
     antennas = Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values())
     group = int(np.searchsorted(np.cumsum(antennas.counts), index, side="right"))
     return antennas.by_group(radio.antenna_or_default)[group]
+
+
+def _with_spreading_factor(radio: Radio, scenario: Scenario, index: int) -> Radio:
+    """Return the radio with the spreading factor of a robot, if it has one."""
+    if radio.lora_or_none is None:
+        return radio
+    antennas = Antennas.of_groups((table.count, table.radio) for table in scenario.robots.values())
+    factor = int(antennas.spreading_factors(radio.lora_or_none.spreading_factor)[index])
+    return replace(radio, lora=replace(radio.lora_or_none, spreading_factor=factor))
 
 
 def _index(static: Static, robot: str | None) -> int:
