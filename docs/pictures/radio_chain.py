@@ -29,7 +29,7 @@ STEPS = (
         Step(
             SENDER,
             "medium access",
-            ("none, aloha, cad,", "csma-802154, dcf, esb"),
+            ("none, aloha, cad,", "csma-802154, dcf, esb,", "advertising"),
             ("channel_busy", "duty_cycle"),
             is_phy=True,
         ),

@@ -47,6 +47,7 @@ The world's loop calls `step` and then `send` in each tick. What these call, and
     |           ack_timed_out        phy/mac.py                no acknowledgement: retry, or end the packet
     |           record_last_attempt  phy/results.py            a unicast packet ends with this fate
     |        run_until               phy/esb.py                with a station that polls, in place of phy/mac.py
+    |        run_until               phy/advertising.py        with advertising events and scans, in place of phy/mac.py
     |        append_results          phy/packets.py            these rows as packets and links
     |        pass_received           phy/model.py              `after_reception` of each, as above
     |  RadioModel.disrupt            model.py                  only while robots are dead or radios off

@@ -38,7 +38,7 @@ class Fate(ExplainedEnum):
     BLACKOUT = 9, "the sender's radio was off, or that of a receiver within reach"
     PARTITIONED = 10, "within reach, but a partition kept the two apart when the packet went on air"
     TOO_WEAK = 11, "within reach on average, but too weak for the receiver's noise when the packet was on air"
-    COLLIDED = 12, "other packets on air disturbed it, or the receiver was receiving another packet or sending"
+    COLLIDED = 12, "other packets disturbed it, or the receiver was receiving another, sending, or on another channel"
     BURST = 13, "lost by a burst, while the link was in its bad state"
     CHANNEL_BUSY = 14, "the sender found the medium busy each time it listened: never on air"
     JAMMED = 15, "a jammer disturbed it: without the jammer it would have been received"

@@ -162,8 +162,47 @@ class ReceiverNoise:
         return noise_dbm(self.bandwidth_hz, self.figure_db)
 
 
+MAX_CHANNELS = 3  # advertising channels 37, 38 and 39 of Bluetooth LE
+
+
+@dataclass(frozen=True)
+class Advertising:
+    """Bluetooth LE: each packet is an advertising event, and robots scan while they do not send."""
+
+    channels: int = parameter(
+        MAX_CHANNELS,
+        help="channels on which an event sends its PDU in turn, and which a scanner visits in turn",
+        at_least=1,
+        at_most=MAX_CHANNELS,
+    )
+    gap_s: float = parameter(
+        150e-6,
+        help="time from the end of a PDU to the begin of the next; default: Zephyr's",
+        unit="s",
+        at_least=0,
+        at_most=0.01,
+    )
+    max_delay_s: float = parameter(
+        0.01, help="advDelay: an event is delayed by 0 to this, drawn for each packet", unit="s", at_least=0, at_most=1
+    )
+    scan_interval_s: float = parameter(
+        0.03,
+        help="time from scan to scan, each on the next channel; default: Zephyr's for continuous scanning",
+        unit="s",
+        at_least=0.0025,
+        at_most=40.96,
+    )
+    scan_window_s: float | None = parameter(
+        None,
+        help="duration of a scan, at most scan_interval_s; default: scan_interval_s",
+        unit="s",
+        at_least=0.0025,
+        at_most=40.96,
+    )
+
+
 RATE_CONTROLS = ("fixed", "ideal", "aarf")
-METHODS = ("none", "aloha", "csma-802154", "dcf", "esb", "cad")
+METHODS = ("none", "aloha", "csma-802154", "dcf", "esb", "cad", "advertising")
 
 
 @dataclass(frozen=True)
@@ -174,7 +213,7 @@ class Access:
         "none",
         help="none: frames never interfere; aloha: frames interfere, and radios send at once; csma-802154: unslotted "
         "CSMA/CA; dcf: CSMA/CA of IEEE 802.11; esb: a station polls all others, which only answer; cad: channel "
-        "activity detection of LoRa",
+        "activity detection of LoRa; advertising: aloha on the advertising channels of Bluetooth LE",
         choices=METHODS,
     )
     acknowledged: bool = parameter(

@@ -15,6 +15,7 @@ from swarmwire.comms.radio.config.lora import LORA_RECEPTION, Lora, refuse_unfit
 from swarmwire.comms.radio.config.path_loss_models import Friis, ItuIndoor, LogDistance, TwoRay
 from swarmwire.comms.radio.config.phy import (
     Access,
+    Advertising,
     Bodies,
     Fading,
     ReceiverNoise,
@@ -152,6 +153,9 @@ class Radio:
     noise: ReceiverNoise | None = parameter(None, help="PHY only: receiver noise")
     reception: Reception | None = parameter(None, help="PHY only: error model of frames")
     access: Access | None = parameter(None, help="PHY only: channel access, and whether frames collide")
+    advertising: Advertising | None = parameter(
+        None, help="access method advertising only: events, and scans of their receivers"
+    )
     bursts: Bursts | None = parameter(None, help="links alternate between a good and a bad state (Gilbert and Elliott)")
     trace: Trace | None = parameter(None, help="replay of measured links")
     delays: Delays | None = parameter(None, help="a further delay, for each receiver")
@@ -249,7 +253,7 @@ class Radio:
 # Checks of several keys: an error names the key that contradicts another.
 
 
-PHY_KEYS = ("lora", "antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access")
+PHY_KEYS = ("lora", "antenna", "shadowing", "walls", "bodies", "fading", "noise", "reception", "access", "advertising")
 MODEL_KEYS = {"log_distance": "log-distance", "two_ray": "two-ray", "itu_indoor": "itu-indoor"}
 OFDM_MODELS = ("802.11ag", "802.11ag-nist")
 RECEPTIONS = {  # besides threshold and table
@@ -375,13 +379,18 @@ def _check_phy(radio: Radio, where: str) -> None:
         raise BadInput(where, "radio.bodies_block", "expected the model unit disk with it; a PHY has radio.bodies")
     if radio.walls is not None and radio.needs_line_of_sight:
         raise BadInput(where, "radio.walls", "expected no line_of_sight with it: obstacles either block or weaken")
-    method = radio.access_or_default.method
+    method, advertising = radio.access_or_default.method, radio.advertising
+    if advertising is not None and method != "advertising":
+        raise BadInput(where, "radio.advertising", f'expected access.method = "advertising" with it, got "{method}"')
+    if advertising is not None and (advertising.scan_window_s or 0.0) > advertising.scan_interval_s:
+        expected = f"expected at most scan_interval_s, {advertising.scan_interval_s:g}"
+        raise BadInput(where, "radio.advertising.scan_window_s", f"{expected}; got {advertising.scan_window_s:g}")
     if method == "dcf" and not radio.frame.startswith("802.11"):
         raise BadInput(where, "radio.access.method", 'expected a frame of IEEE 802.11 for "dcf", such as 802.11b')
     if method != "dcf" and radio.frame == "802.11n":
         raise BadInput(where, "radio.access.method", f'expected "dcf" for frames of 802.11n, got "{method}"')
-    if method == "csma-802154" and radio.frame != "plain":
-        raise BadInput(where, "radio.access.method", f'expected frame = "plain" for "csma-802154", got {radio.frame}')
+    if method in ("csma-802154", "advertising") and radio.frame != "plain":
+        raise BadInput(where, "radio.access.method", f'expected frame = "plain" for "{method}", got {radio.frame}')
     if (method == "esb") != (radio.frame == "esb"):
         raise BadInput(where, "radio.access.method", f'expected "esb" with frame = "esb" alone; got {method}')
     if method == "esb" and not radio.access_or_default.acknowledged:

@@ -121,7 +121,7 @@ def _powers(jammers, position, x, y, z, robots, obstacles, propagation):
 def refresh(params, state, events, now_ns):
     """Recompute the noise of all robots after a change of jammers, their power or the PHY parameters."""
     for arena in range(len(state.keys)):
-        _refresh_arena(params, state, events, arena, now_ns)
+        refresh_arena(params, state, events, arena, now_ns)
 
 
 @kernel()
@@ -132,11 +132,12 @@ def toggle(params, state, events):
     jam.next[0] += 1
     jammer = jam.jammer[i]
     jam.is_on[jammer] = not jam.is_on[jammer]
-    _refresh_arena(params, state, events, jam.arena[jammer], jam.at_ns[i])
+    refresh_arena(params, state, events, jam.arena[jammer], jam.at_ns[i])
 
 
 @kernel()
-def _refresh_arena(params, state, events, arena, now_ns):
+def refresh_arena(params, state, events, arena, now_ns):
+    """Recompute the noise of an arena's robots."""
     jam = state.jam
     for i in range(params.robots):
         r = arena * params.robots + i

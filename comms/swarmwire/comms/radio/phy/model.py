@@ -13,13 +13,14 @@ from swarmwire.comms.base import math as portable
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray, Table
 from swarmwire.comms.base.kernels import njit
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, UNDER_WAY
+from swarmwire.comms.radio.config.phy import MAX_CHANNELS
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.liveness import LivenessHistory
 from swarmwire.comms.radio.model import RadioModel
-from swarmwire.comms.radio.phy import esb, jamming, mac, tx_queue
+from swarmwire.comms.radio.phy import advertising, esb, jamming, mac, tx_queue
 from swarmwire.comms.radio.phy.duty_cycle import airtime_log
 from swarmwire.comms.radio.phy.event_queue import event_queue
 from swarmwire.comms.radio.phy.graph import RadioGraph
@@ -132,10 +133,12 @@ class SinrPhy(RadioModel):
         self._graph = RadioGraph(context, self._params, self._links, self._jam, self._losses)
         self._reports = Reporter(context, self._links, packets, links)
         self._events = event_queue(rows)
-        self._robot, self._reception = idle_robots(rows), idle_receptions(rows)
-        # 802.11n has an event loop of its own; compiled functions depend on the types of these tables.
-        is_ht = self._params.ht is not None
-        self._mac: Any = events if is_ht else mac
+        # 802.11n, polling and advertising have event loops; compiled functions depend on the types of these tables.
+        is_ht, method = self._params.ht is not None, context.radio.access_or_default.method
+        is_esb, is_advertising = method == "esb", method == "advertising"
+        self._robot = idle_robots(rows)
+        self._reception = idle_receptions(rows * MAX_CHANNELS if is_advertising else rows)
+        self._mac: Any = events if is_ht else advertising if is_advertising else mac
         self._ht = idle_stations(rows, context.robots) if is_ht else None
         self._packets, self._frames = PacketTable(rows, MPDU if is_ht else PACKET), frames_of(context.radio)
         # Queues are set up again if packets are new; no event is due before `_next_ns`.
@@ -143,9 +146,9 @@ class SinrPhy(RadioModel):
         self._is_new, self._next_ns, self._buffer = True, 0, result_buffer(MIN_CAPACITY)
         self._spent = airtime_log(rows, context.radio)
         self._switch = tx_queue.switches_of(context.disruption)
-        is_esb = context.radio.access_or_default.method == "esb"
         self._esb_timing = esb.esb_timing(context.radio) if is_esb else None
         self._polling = esb.new_polling(context.stations, context.robots, len(context.keys)) if is_esb else None
+        self._advertising = self._advertising_timing() if is_advertising else None
         self._pose_id, self._poses = 0, {0: np.zeros((rows, 4))}
         self._now_ns = self._poses_from_ns = self._last_rows = 0
         self._tx_status: list[TxStatuses] = []
@@ -188,6 +191,7 @@ class SinrPhy(RadioModel):
         self._despreading = self._despreading_gains()
         self._frames = frames_of(radio)
         self._esb_timing = self._esb_timing and esb.esb_timing(radio)
+        self._advertising = self._advertising and self._advertising_timing()
         if not len(self._spent.minute):
             self._spent = airtime_log(len(self._robot), radio)
         self._losses.tune(context, at_ns)
@@ -228,15 +232,15 @@ class SinrPhy(RadioModel):
         while next_ns == mac.BUFFER_IS_FULL:
             if parts:
                 buffer = result_buffer(capacity)
-            if self._polling is None:
-                next_ns = self._mac.run_until(
-                    self._params, losses, state, self._events, buffer, max_links, until_ns, self._start, self._is_new
-                )
-            else:
+            tables = losses, state, self._events, buffer, max_links
+            if self._polling is not None:
                 next_ns = esb.run_until(
-                    *(self._params, self._esb_timing, self._polling, losses, state, self._events, buffer, max_links),
+                    *(self._params, self._esb_timing, self._polling, *tables),
                     *(self._now_ns, until_ns, self._start, self._is_new),
                 )
+            else:
+                timing = () if self._advertising is None else (self._advertising,)
+                next_ns = self._mac.run_until(self._params, *timing, *tables, until_ns, self._start, self._is_new)
             self._is_new = False
             parts.append(buffer)
         self._next_ns = next_ns
@@ -291,8 +295,13 @@ class SinrPhy(RadioModel):
 
     def _refresh(self) -> None:
         """Recompute the noise of all robots, before or after a change of its sources."""
-        state = self._state(self._switch, self._now_ns)
-        jamming.refresh(self._params, state, self._events, self._now_ns)
+        state, rows = self._state(self._switch, self._now_ns), len(self._robot)
+        for first in range(0, len(self._reception), rows):  # of each channel
+            on_channel = state._replace(reception=self._reception[first : first + rows])
+            jamming.refresh(self._params, on_channel, self._events, self._now_ns)
+
+    def _advertising_timing(self) -> advertising.AdvertisingTiming:
+        return advertising.advertising_timing(self._radio, self._context.keys, self._context.robots)
 
     def _state(self, switch: RadioSwitches, until_ns: int) -> PhyState:
         """Return the state for events until `until_ns`, with these switches of the radios."""

@@ -102,6 +102,7 @@ LINK = record_type(
         ("above_sensitivity", np.bool_),  # the mean power reaches the sensitivity
         ("fate", np.int8),  # UNDER_WAY, or the drop reason of all packets on a link that is cut
         ("frame_fate", np.int8),  # fate of the frame on air, or RECEIVING
+        ("pdu_fate", np.int8),  # advertising: number and fate of the PDU that decides so far, or UNDER_WAY
     ]
 )
 
