@@ -18,12 +18,12 @@ help: ## list the commands
 		printf '  make %-10s %s\n' "$$name" "$$text"; done
 
 .PHONY: demo
-demo: ## fly a flock over a lossy radio, a process per robot, and record it under runs/ with a picture
+demo: ## fly a flock that a rock splits, a process per robot, and draw the moment of the split under runs/
 	@echo "installing into .venv/, then a run of a minute; the first one compiles for half a minute before ..."
 	@.ci/sync --extra view
 	@run=runs/demo-$$(date -u +%Y%m%dT%H%M%SZ) && set -x && \
-		$(RUN) swarmwire run scenarios/flocking-lossy.toml --set duration_s=60 --runners per-robot --out $$run && \
-		$(RUN) swarmwire export $$run && { set +x; } 2>/dev/null && \
+		$(RUN) swarmwire run scenarios/split.toml --set duration_s=70 --runners per-robot --packets all --out $$run && \
+		$(RUN) swarmwire export $$run --at 35 && { set +x; } 2>/dev/null && \
 		echo "see the picture: file://$$PWD/$$run/picture.png" && \
 		echo "put swarmwire on your PATH: make install; then: swarmwire view $$run"
 

@@ -17,7 +17,7 @@ from tests.docs.pages import ROOT, commands_of
 from tests.support.deploy.machines import Machine, Started, machines
 from tests.support.deploy.runs import LOSSY, called
 
-PAGE = "docs/joining.md"
+PAGE = "docs/distributed.md"
 CERTIFICATES = "docs/security.md"  # whose commands make the certificates of the machines
 NAMES = ("lab", "gate", "laptop")
 

@@ -1,7 +1,7 @@
 """The borders of agent processes: limits of an agent's code beyond the socket to its host.
 
 The fork server enters the borders that all processes share before it imports an agent, each process the others before
-it gets its robots. `docs/processes.md` lists them. This module imports nothing of zenoh.
+it gets its robots. `docs/distributed.md` lists them. This module imports nothing of zenoh.
 """
 
 import os
