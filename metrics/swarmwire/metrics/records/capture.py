@@ -154,8 +154,8 @@ def _radiotap(radio: Radio, frame: CapturedFrame) -> bytes:
         fields += struct.pack("<b", max(-128, min(round(frame.rssi_dbm), 127)))
     if is_ht:
         present = present ^ RADIOTAP_RATE | RADIOTAP_MCS
-        known = HT_KNOWN | (MCS_KNOWN if radio.access_or_default.rate_control == "fixed" else 0)
-        fields += struct.pack("<BBB", known, 0, list(HT_BITS_PER_SYMBOL).index(radio.bit_rate_bps))
+        fields_known = HT_KNOWN | (MCS_KNOWN if radio.access_or_default.rate_control == "fixed" else 0)
+        fields += struct.pack("<BBB", fields_known, 0, list(HT_BITS_PER_SYMBOL).index(radio.bit_rate_bps))
     return struct.pack("<BBHI", 0, 0, 8 + len(fields), present) + fields
 
 
