@@ -63,7 +63,7 @@ def test_view_without_a_recording_or_live_run_is_refused(tmp_path, content):
 
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
-    with pytest.raises(BadInput, match=r"^view: .*swarmwire-metrics\[view\]"):
+    with pytest.raises(BadInput, match=r"^view: .*swarmwire\[view\]"):
         view_command(tmp_path)
 
 
