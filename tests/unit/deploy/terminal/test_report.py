@@ -159,7 +159,8 @@ TIME = {"unit": "s", "kind": "time", "help": "", "listed": False, "hold_s": 0.0}
 ABOUT = {
     "format": 1, "name": "times", "scenario": "times", "command": "", "began_utc": "", "versions": {}, "cpu": "",
     "modules": {}, "files": [], "design": "grid", "seeds": [1, 2, 3, 4], "vary": {}, "points": [{}], "overrides": [],
-    "duration_s": 50.0, "robots": 1, "series": False, "record_seeds": [], "batch": None, "realtime": None, "max_late": 0.01, "point_overrides": [[]],
+    "duration_s": 50.0, "robots": 1, "series": False, "record_seeds": [], "batch": None,
+    "realtime": None, "max_late": 0.01, "point_overrides": [[]],
     "responses": [{"column": "stop_time_s", **TIME}, {"column": "find_time_s", **TIME}],
 }  # fmt: skip
 
