@@ -141,7 +141,7 @@ def _figure(experiment: Experiment, layout: Layout, draw: str) -> Problems:
 
 def pictures() -> Problems:
     """The pages about the radio show each of their figures once; pictures are small enough to be kept with the code."""
-    text = _text("docs/radio.md")
+    text = _text("docs/radio.md") + _text("docs/radio-presets.md")
     shown = re.findall(r"^!\[.+\]\(radio/(.+)\.svg\)$", text, re.MULTILINE)
     if not sorted(shown) == sorted(FIGURES) == sorted(path.stem for path in (ROOT / "docs" / "radio").iterdir()):
         yield f"docs/radio*.md: expected each figure once: {sorted(FIGURES)}"

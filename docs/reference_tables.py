@@ -12,6 +12,7 @@ from typing import Any, cast
 
 from typer.main import get_command
 
+from docs import robot_radios
 from docs.behaviours.shown import page_of
 from docs.dependencies import licences
 from swarmwire.deploy.cli.app import app
@@ -391,6 +392,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "preset-sources": lambda: facts_of("presets", "source"),
     "presets": lambda: rows_of("presets", "reach", "longest frame", "but"),
     "readings": reading_table,
+    "robot-radios": lambda: table(robot_radios.HEAD, robot_radios.rows()),
     "ros2-names": lambda: body_key_table("ros2"),
     "sensors": sensor_tables,
 }

@@ -27,7 +27,8 @@ from benchmarks.ns3.comparison import (
     write_csv,
     write_record,
 )
-from benchmarks.ns3.configurations import SECTIONS, Configuration
+from benchmarks.ns3.configurations import Configuration
+from benchmarks.ns3.sections import SECTIONS
 from benchmarks.ns3.simulators import NETWORK, Received, ours, theirs
 from benchmarks.ns3.speed import speed
 from benchmarks.ns3.trace import trace
@@ -70,7 +71,7 @@ def main(arguments: Sequence[str]) -> int:
     figures = recorded() if options.recorded else _run(every, Path(options.cache), options.processes)
     rows = {name: _rows(name, configurations, figures) for name, configurations in sections.items()}
     if options.record and figures:
-        write_record(figures)
+        write_record(figures, [each for make in SECTIONS.values() for each in make()])
     tables = {name: table(section_rows) for name, section_rows in rows.items()}
     if not set(SECTIONS) - set(names):
         tables["summary"] = summary(rows)
@@ -103,12 +104,11 @@ def _options(arguments: Sequence[str]) -> Namespace:
     parser.add_argument("--processes", type=int, default=2, metavar="N", help="of ns-3 at a time (2)")
     parser.add_argument("--page", type=Path, metavar="FILE", help="put the tables between this page's marks")
     parser.add_argument("--recorded", action="store_true", help="compare with the record instead of running ns-3")
-    parser.add_argument("--record", action="store_true", help="write ns-3's figures as the record that tests use")
+    parser.add_argument("--record", action="store_true", help="keep ns-3's figures in the record of the tests")
     parser.add_argument("--build", type=Path, metavar="DIR", help="speed: also an ns-3 build with include/ and lib/")
     options = parser.parse_args(arguments)
-    is_part = options.only and options.only != ["trace"] and set(SECTIONS) - set(options.only)
-    if options.record and (options.recorded or options.quick or is_part):
-        parser.error("--record: expected all sections or trace alone with ns-3, without --recorded and --quick")
+    if options.record and (options.recorded or options.quick):
+        parser.error("--record: expected ns-3, hence neither --recorded nor --quick")
     return options
 
 

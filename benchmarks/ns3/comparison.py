@@ -16,7 +16,7 @@ from benchmarks.ns3.simulators import Received
 from swarmwire.comms.base.arrays import BoolArray, FloatArray
 from swarmwire.comms.base.errors import BadInput
 
-REACH_M = {"802.15.4": 100.0, "802.11a": 50.0, "802.11b": 50.0, "802.11g": 50.0}  # about, of a lone frame in ns-3
+WPAN_REACH_M, WIFI_REACH_M = 100.0, 50.0  # about, of a lone frame in ns-3
 BINS = 4
 FEWEST_PAIRS = 20  # in a bin, over all seeds
 OF_REACH = " % of reach"
@@ -29,6 +29,12 @@ REASONS = {  # why rows are misses, by what their first cells match
     "channel access, and one that waits for an acknowledgement meanwhile takes it for lost (lr-wpan-mac.cc, "
     "PdDataIndication, marked there as open); here the backoff continues: IEEE 802.15.4-2006, 7.5.6.4, asks for "
     "neither",
+    r"802.11n 65M .* 31 m, unicast": "short frames at MCS 7 are received at 0.38 dB less than in ns-3: [the "
+    "receiver](../radio.md#noise-and-reception)",
+    r"802.11n .* one spot, unicast$": "after A-MPDUs that collide, and for packets whose lifetime ends, ns-3 sends "
+    "more requests of a block acknowledgement than a station here; single frames agree. Not traced further",
+    r"802.11n .* 40, 40 m, unicast": "packets of hidden senders wait longer here close to saturation; the cause was "
+    "not found. Delivery and full queues agree",
 }
 Figures = dict[str, FloatArray]  # by name, (seeds,) each; NaN where nothing was received, or no pair is that far apart
 
@@ -80,7 +86,8 @@ def _bins(configuration: Configuration, intended: BoolArray) -> dict[str, BoolAr
     """Pairs by their distance, (seeds, nodes, nodes) each."""
     xy_m = configuration.xy_m()
     apart_m = np.linalg.norm(xy_m[:, :, None] - xy_m[:, None], axis=-1)
-    part, edges = apart_m / REACH_M[configuration.standard], np.linspace(0.0, 1.0, BINS + 1).tolist()
+    reach_m = WPAN_REACH_M if configuration.standard == "802.15.4" else WIFI_REACH_M
+    part, edges = apart_m / reach_m, np.linspace(0.0, 1.0, BINS + 1).tolist()
     bins = {
         f"{100 * near:g} to {100 * far:g}{OF_REACH}": intended & (part >= near) & (part < far)
         for near, far in pairwise(edges)
@@ -270,8 +277,10 @@ def recorded() -> dict[Configuration, Figures]:
     return {_configuration(row["configuration"]): _figures(row["figures"]) for row in rows}
 
 
-def write_record(figures: dict[Configuration, Figures]) -> None:
-    """Write figures of ns-3 as the record, a line for each configuration."""
+def write_record(figures: dict[Configuration, Figures], every: Iterable[Configuration]) -> None:
+    """Write figures of ns-3 as the record, a line for each configuration; those of others of `every` stay."""
+    merged = recorded() | figures
+    figures = {each: merged[each] for each in every if each in merged}
     lines = [
         json.dumps(
             {"configuration": each.as_mapping(), "figures": {n: _numbers(values) for n, values in own_figures.items()}}

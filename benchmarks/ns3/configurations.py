@@ -1,7 +1,7 @@
-"""What both simulators run: sections of configurations, the radio of each, its places and its send times."""
+"""A configuration that both simulators run: its radio, its places and its send times."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,10 @@ SPOT_M = 0.7  # side of the square in which distances do not count: below 1 m th
 POSITION_PURPOSE = purpose("place of validation")
 EVER = 2**31 - 1
 MODES = {"802.11a": "OfdmRate{}Mbps", "802.11b": "DsssRate{}Mbps", "802.11g": "ErpOfdmRate{}Mbps"}
+MCS_MBPS = (6.5, 13.0, 19.5, 26.0, 39.0, 52.0, 58.5, 65.0)  # of 802.11n, 20 MHz, one stream, guard interval of 800 ns
+RATE_CONTROLS = {"fixed": "ConstantRate", "ideal": "Ideal"}  # and what ns-3 calls them
+MAX_AMPDU_BYTES = 65535
+NEVER_BYTES = 4692480  # ns-3's default of RtsCtsThreshold, above every frame
 # What ns-3 has by default where a preset has other values: loss at 1 m, power, no headers of IP and UDP; for 802.15.4
 # noise and sensitivity of its ideal receiver, and a queue without end.
 ALIKE = {
@@ -30,17 +34,19 @@ ALIKE = {
         "radio.reception.sensitivity_dbm=-106.58",
     ),
     "802.11": ("radio.overhead_bytes=36", "radio.antenna.power_dbm=16.0206"),
+    "802.11n": ("radio.overhead_bytes=38", "radio.antenna.power_dbm=16.0206"),
 }
+PRESETS = {"802.11b": "wifi-b-1M", "802.11n": "wifi-n-5G"}
 
 
-def radio_like_ns3(standard: str, rate_mbps: float) -> Radio:
-    """A preset at this rate, with what ns-3 has by default."""
+def radio_like_ns3(standard: str, rate_mbps: float, settings: Sequence[str] = ()) -> Radio:
+    """A preset at this rate, with what ns-3 has by default, and these settings of 802.11."""
     loss = "radio.log_distance.reference_loss_db=46.6777"
     if standard == "802.15.4":
         return radio_of("ieee802154", [loss, *ALIKE[standard]])
     rate = f"radio.bit_rate_bps={round(1e6 * rate_mbps)}"
-    preset = "wifi-b-1M" if standard == "802.11b" else "wifi-a-6M"
-    return radio_of(preset, [loss, rate, f"radio.frame={standard}", *ALIKE["802.11"]])
+    alike = ALIKE.get(standard, ALIKE["802.11"])
+    return radio_of(PRESETS.get(standard, "wifi-a-6M"), [loss, rate, f"radio.frame={standard}", *alike, *settings])
 
 
 @dataclass(frozen=True)
@@ -62,10 +68,29 @@ class Configuration:
     is_saturated: bool = False  # senders always have a packet: what counts is the throughput
     seeds: int = 6
     measured_s: float = 2.0
+    # Of 802.11n.
+    rate_control: str = "fixed"  # else `rate_mbps` is the highest rate
+    ampdu_bytes: int = MAX_AMPDU_BYTES  # the greatest A-MPDU; 0: no aggregation
+    rts_bytes: int = NEVER_BYTES  # RTS/CTS precedes larger frames
 
     def as_mapping(self) -> dict[str, Any]:
         """What a record and a cache know it by."""
         return {**asdict(self), "size_m": list(self.size_m)}
+
+    @property
+    def radio(self) -> Radio:
+        """The medium's radio."""
+        settings = [
+            f"radio.access.rate_control={self.rate_control}",
+            f"radio.access.aggregation_bytes={self.ampdu_bytes}",
+            *([f"radio.access.rts_threshold_bytes={self.rts_bytes}"] if self.has_rts else []),
+        ]
+        return radio_like_ns3(self.standard, self.rate_mbps, settings if self.standard == "802.11n" else ())
+
+    @property
+    def has_rts(self) -> bool:
+        """Whether RTS/CTS precedes some frames."""
+        return self.rts_bytes < NEVER_BYTES
 
     @property
     def where(self) -> str:
@@ -77,14 +102,19 @@ class Configuration:
             "area": f"{distances} m square",
             "pairs": f"at {distances} m",
         }
-        return where[self.layout] + (", mixed" if self.is_mixed else ", unicast" if self.unicast else "")
+        words = [where[self.layout]]
+        words += ["mixed"] if self.is_mixed else ["unicast"] if self.unicast else []
+        if self.ampdu_bytes != MAX_AMPDU_BYTES:
+            words += [f"A-MPDU of {self.ampdu_bytes} bytes" if self.ampdu_bytes else "single frames"]
+        words += ["RTS/CTS"] if self.has_rts else []
+        return ", ".join(words)
 
     @property
     def cells(self) -> list[str]:
         """The first cells of its row."""
         interval_ms = f"{1e3 * self.interval_s:g}"
         return [
-            f"{self.standard} {self.rate_mbps:g}M",
+            f"{self.standard} {self.rate_control if self.rate_control != 'fixed' else f'{self.rate_mbps:g}M'}",
             str(self.nodes),
             str(self.payload_bytes),
             interval_ms,
@@ -103,7 +133,9 @@ class Configuration:
     @property
     def ticks(self) -> int:
         """Packets that each sender hands over in all."""
-        return round((WARM_UP_S + self.measured_s + LATE_S) * self.rate_hz)
+        is_long = self.standard == "802.11n" and self.is_saturated  # thousands of packets, none of which would count
+        late_s = 0.0 if is_long else LATE_S
+        return round((WARM_UP_S + self.measured_s + late_s) * self.rate_hz)
 
     @property
     def counted(self) -> tuple[int, int]:
@@ -126,6 +158,8 @@ class Configuration:
     @property
     def mode(self) -> str:
         """What ns-3 calls the rate."""
+        if self.standard == "802.11n":
+            return f"HtMcs{MCS_MBPS.index(self.rate_mbps)}"
         return MODES[self.standard].format(f"{self.rate_mbps:g}".replace(".", "_")) if self.standard in MODES else "-"
 
     def xy_m(self) -> FloatArray:
@@ -148,6 +182,8 @@ class Configuration:
         """The receiver of a sender's packets; -1: all."""
         if not self.unicast or (self.is_mixed and sender % 2):
             return -1
+        if self.layout == "line":
+            return self.nodes - 1
         return (sender + (self.senders if self.layout == "pairs" else 1)) % self.nodes
 
     def ns3_input(self, seed: int, walk_m: FloatArray | Path | None = None) -> str:
@@ -159,7 +195,8 @@ class Configuration:
         xy_m = self.xy_m()[seed][None] if walk_m is None else walk_m
         positions = [f'"{xy_m}"'] if isinstance(xy_m, Path) else xy_m.ravel().tolist()
         ticks = 0 if isinstance(xy_m, Path) else len(xy_m)
-        head = [self.standard, self.mode, seed + 1, self.nodes, self.payload_bytes, *self.counted, *self.counted_ns]
+        head = [self.standard, self.mode, RATE_CONTROLS[self.rate_control], self.ampdu_bytes, self.rts_bytes]
+        head += [seed + 1, self.nodes, self.payload_bytes, *self.counted, *self.counted_ns]
         head += [self.counted_ns[1] * 1e-9, ticks, self.interval_s, at_ns.size, *positions]
         packets = [
             f"{sender} {tick} {self.receiver_of(sender)} {at_ns[tick, sender]}"
@@ -167,109 +204,3 @@ class Configuration:
             for sender in range(self.senders)
         ]
         return " ".join([*map(str, head), *packets])
-
-
-# Sections: (standard and rate, nodes, bytes, interval in ms) and where.
-
-
-Kind = tuple[str, float]
-WPAN, A6, A54, B1, B11 = ("802.15.4", 0.25), ("802.11a", 6.0), ("802.11a", 54.0), ("802.11b", 1.0), ("802.11b", 11.0)
-FEW = {"seeds": 10, "measured_s": 4.0}  # few nodes: more packets for the same error
-
-
-def _configuration(kind: Kind, nodes: int, octets: int, interval_ms: float, **more: Any) -> Configuration:
-    options: dict[str, Any] = {"seeds": 12 if kind == WPAN else 6, **more}  # few packets in 2 s, and quickly run
-    return Configuration(*kind, nodes, octets, 1e-3 * interval_ms, **options)
-
-
-def _line(kind: Kind, octets: int, interval_ms: float, *size_m: float, **more: Any) -> Configuration:
-    return _configuration(kind, len(size_m) + 1, octets, interval_ms, layout="line", size_m=size_m, **{**FEW, **more})
-
-
-def _area(kind: Kind, octets: int, interval_ms: float, side_m: float, **more: Any) -> Configuration:
-    return _configuration(kind, 40, octets, interval_ms, layout="area", size_m=(side_m,), **more)
-
-
-def spot() -> list[Configuration]:
-    """Everybody hears everybody equally well: access to the channel alone."""
-    nodes = (5, 10, 20, 40, 80)
-    wpan = [*((n, 20, 100) for n in nodes), (20, 20, 50), (20, 49, 100), (40, 49, 100)]
-    fast, slow = [*((n, 128, 20) for n in nodes), (80, 128, 100)], [*((n, 128, 100) for n in nodes), (20, 128, 50)]
-    rows = [*((WPAN, row) for row in wpan), *((A6, row) for row in fast), (A54, fast[3]), *((B1, row) for row in slow)]
-    return [_configuration(kind, *row) for kind, row in rows]
-
-
-def overload() -> list[Configuration]:
-    """More packets than there is time for: what waits too long is dropped."""
-    rows = [(A6, 3, 128, 0.5), (A6, 2, 128, 0.4), (B1, 10, 128, 5), (B1, 5, 128, 2)]
-    return [_configuration(*row, seeds=3, measured_s=1.0) for row in rows]
-
-
-def distance() -> list[Configuration]:
-    """One sender and one receiver: noise alone."""
-    near_m = {WPAN: (95, 105, 110, 115, 120), A6: (49, 53), A54: (28, 31, 33, 35), B1: (49, 53), B11: (45, 53)}
-    return [
-        _line(kind, 20 if kind == WPAN else 128, 10, m) for kind, distances_m in near_m.items() for m in distances_m
-    ]
-
-
-def hidden() -> list[Configuration]:
-    """Two senders that do not hear one another, and a receiver between them."""
-    rows = [(WPAN, 20, 20, 70, 70), (WPAN, 20, 20, 55, 75), (WPAN, 89, 20, 70, 70), (WPAN, 89, 20, 55, 75)]
-    rows += [(kind, 128, interval_ms, *m) for kind, interval_ms in ((A6, 10), (A6, 2), (B1, 10)) for m in BETWEEN_M]
-    return [_line(*row, seeds=20) for row in rows]
-
-
-def area() -> list[Configuration]:
-    """40 nodes at random over a square: they hear one another well, weakly and not at all."""
-    kinds = ((WPAN, 40, 100), (A6, 128, 20), (B1, 128, 100))
-    return [_area(*kind, side_m) for kind, side_m in product(kinds, (40, 80, 150, 250, 400))]
-
-
-def saturation() -> list[Configuration]:
-    """Queues that are never empty: throughput."""
-    rows = [(A6, 5, 2.5), (A6, 10, 5), (A6, 20, 5), (B1, 5, 20), (B1, 10, 40), (B1, 20, 40)]
-    more: dict[str, Any] = {"is_saturated": True, "seeds": 4}
-    return [
-        _configuration(kind, nodes, 512, ms, unicast=to, **more)
-        for to, (kind, nodes, ms) in product((False, True), rows)
-    ]
-
-
-def unicast() -> list[Configuration]:
-    """To the next node, acknowledged and sent again."""
-    rows = [(WPAN, 10, 20, 100), (WPAN, 20, 20, 100), (WPAN, 40, 20, 100), (A6, 20, 128, 20), (A6, 40, 128, 20)]
-    weak = [(WPAN, 20, 20, 105), (WPAN, 20, 20, 115), (A54, 128, 10, 33)]
-    rows.append((B1, 20, 128, 100))
-    areas = [(WPAN, 20, 200, 80), (A6, 128, 50, 40), (A6, 128, 50, 80), (B1, 128, 200, 40), (B1, 128, 200, 60)]
-    mixed = [((A6, 128, 50, 80), 12), ((B1, 128, 200, 60), 32)]
-    return [
-        *(_configuration(*row, unicast=True) for row in rows),
-        *(_line(*row, unicast=True) for row in weak),
-        *(_area(*row, unicast=True, seeds=12) for row in areas),
-        *(_area(*row, unicast=True, is_mixed=True, seeds=seeds) for row, seeds in mixed),
-    ]
-
-
-def exposed() -> list[Configuration]:
-    """Two pairs of which one sender hears the other, but not its receiver: only the NAV protects acknowledgements."""
-    more: dict[str, Any] = {"layout": "pairs", "size_m": (0.0, -20.0, 40.0, -60.0), "unicast": True, **FEW}
-    full = _configuration(A6, 4, 128, 0.5, **{**more, "is_saturated": True, "seeds": 4})
-    return [
-        _configuration(B1, 4, 128, 5, **more),
-        _configuration(B11, 4, 128, 2, **more),
-        _configuration(A6, 4, 128, 2, **more),
-        full,
-    ]
-
-
-def rates() -> list[Configuration]:
-    """The families of presets at their other rates, over a square."""
-    kinds = [(("802.11b", 2.0), 80), (("802.11b", 5.5), 80), (B11, 80), (("802.11a", 12.0), 80)]
-    kinds += [(("802.11a", 24.0), 60), (A54, 40), (("802.11g", 6.0), 80), (("802.11g", 54.0), 40)]
-    return [*(_area(kind, 128, 50, side_m) for kind, side_m in kinds), _area(WPAN, 100, 200, 150)]
-
-
-BETWEEN_M = ((40, 40), (30, 45))
-BUILDERS = (spot, overload, distance, hidden, area, saturation, unicast, exposed, rates)
-SECTIONS = {build.__name__: build for build in BUILDERS}

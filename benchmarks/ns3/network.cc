@@ -39,6 +39,8 @@ struct Packets // of all nodes, in the order of their times
 struct Run
 {
     std::string standard, mode; // "802.15.4", or "802.11a" and the like with one of ns-3's modes
+    std::string manager;        // of rates: what ns-3 calls it without "WifiManager"
+    uint32_t ampdu, rts;        // of 802.11n, in bytes: the greatest A-MPDU, and the size above which RTS/CTS precedes
     uint32_t seed, nodes, payload;
     uint32_t first, last;   // sequence numbers that count, the last one excluded
     int64_t from, until;    // in ns: when they count, too, the end excluded
@@ -54,7 +56,8 @@ Read(std::istream& in)
 {
     Run run;
     size_t packets;
-    in >> run.standard >> run.mode >> run.seed >> run.nodes >> run.payload;
+    in >> run.standard >> run.mode >> run.manager >> run.ampdu >> run.rts;
+    in >> run.seed >> run.nodes >> run.payload;
     in >> run.first >> run.last >> run.from >> run.until >> run.endS >> run.ticks >> run.tickS >> packets;
     run.x.resize(run.ticks * run.nodes);
     run.y.resize(run.x.size());
@@ -183,15 +186,30 @@ Wifi(const NodeContainer& nodes, const Run& run, Received& received)
     channel->SetPropagationDelayModel(CreateObject<ConstantSpeedPropagationDelayModel>());
     YansWifiPhyHelper phy;
     phy.SetChannel(channel);
-    WifiMacHelper mac;
-    mac.SetType("ns3::AdhocWifiMac");
+    WifiMacHelper mac; // 802.11n has QoS, and packets without a priority are best effort
+    mac.SetType("ns3::AdhocWifiMac", "BE_MaxAmpduSize", UintegerValue(run.ampdu));
     WifiHelper wifi;
     std::map<std::string, WifiStandard> standards{{"802.11a", WIFI_STANDARD_80211a},
                                                   {"802.11b", WIFI_STANDARD_80211b},
-                                                  {"802.11g", WIFI_STANDARD_80211g}};
+                                                  {"802.11g", WIFI_STANDARD_80211g},
+                                                  {"802.11n", WIFI_STANDARD_80211n}};
     wifi.SetStandard(standards.at(run.standard));
-    StringValue mode(run.mode);
-    wifi.SetRemoteStationManager("ns3::ConstantRateWifiManager", "DataMode", mode, "ControlMode", mode, "NonUnicastMode", mode);
+    if (run.standard == "802.11n")
+    {
+        phy.Set("ChannelSettings", StringValue("{36, 20, BAND_5GHZ, 0}"));
+    }
+    // RTS and broadcasts of 802.11n have OFDM's lowest rate, which stations that know no MCS decode, too.
+    StringValue mode(run.mode), control(run.standard == "802.11n" ? "OfdmRate6Mbps" : run.mode);
+    std::string manager = "ns3::" + run.manager + "WifiManager";
+    UintegerValue rts(run.rts);
+    if (run.manager == "ConstantRate")
+    {
+        wifi.SetRemoteStationManager(manager, "RtsCtsThreshold", rts, "NonUnicastMode", control, "DataMode", mode, "ControlMode", control);
+    }
+    else
+    {
+        wifi.SetRemoteStationManager(manager, "RtsCtsThreshold", rts, "NonUnicastMode", control);
+    }
     NetDeviceContainer devices = wifi.Install(phy, mac, nodes);
     for (uint32_t i = 0; i < devices.GetN(); i++)
     {

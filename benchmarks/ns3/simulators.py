@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.ns3.configurations import Configuration, radio_like_ns3
+from benchmarks.ns3.configurations import Configuration
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.sentinels import BROADCAST
@@ -46,10 +46,9 @@ class Receptions(NamedTuple):
 def ours(configuration: Configuration) -> Received:
     """The medium, with an arena for each seed."""
     nodes, seeds = configuration.nodes, configuration.seeds
-    radio = radio_like_ns3(configuration.standard, configuration.rate_mbps)
     xy_m = configuration.xy_m().reshape(-1, 2)
     packets, delay_ns = np.zeros(seeds * nodes * nodes, np.int64), np.zeros(seeds * nodes * nodes, np.int64)
-    for done in received(configuration, radio, repeat(xy_m, configuration.ticks + 1)):
+    for done in received(configuration, configuration.radio, repeat(xy_m, configuration.ticks + 1)):
         pair = (done.seed * nodes + done.sender) * nodes + done.receiver
         packets += np.bincount(pair, minlength=len(packets))
         np.add.at(delay_ns, pair, done.delay_ns)

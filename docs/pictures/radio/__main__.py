@@ -12,6 +12,7 @@ from docs.pictures.radio import (
     path_loss,
     reception,
     shadowing,
+    throughput,
     walls,
 )
 
@@ -26,6 +27,7 @@ FIGURES = {
     "delays": delays.draw,
     "access": access.draw,
     "capture": capture.draw,
+    "throughput": throughput.draw,
 }
 
 if __name__ == "__main__":

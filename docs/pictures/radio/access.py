@@ -8,7 +8,8 @@ import numpy as np
 
 from benchmarks.ns3.closed_forms import aloha as throughput
 from benchmarks.ns3.comparison import recorded
-from benchmarks.ns3.configurations import SECTIONS, radio_like_ns3
+from benchmarks.ns3.configurations import radio_like_ns3
+from benchmarks.ns3.sections import SECTIONS
 from docs.pictures.radio.sheet import legend, line_color, panels, set_labels, write
 from swarmwire.comms.radio.analysis.contention import contention
 from swarmwire.comms.radio.config.phy import Access
