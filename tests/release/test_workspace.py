@@ -90,7 +90,7 @@ for heavy in {HEAVY}:
     sys.modules[heavy] = None  # importing it raises ImportError
 import swarmwire.agent, swarmwire.comms
 
-compiled = "radio base.kernels base.draws_compiled base.math.compiled base.geometry"
+compiled = "radio base.kernels base.kernel_archive base.draws_compiled base.math.compiled base.geometry"
 kernels = tuple("swarmwire.comms." + name for name in compiled.split())
 for package in (swarmwire.agent, swarmwire.comms):
     for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):

@@ -412,7 +412,7 @@ def test_floor_is_one_picture_in_a_recording(tmp_path):
 
 def test_without_rerun_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
-    with pytest.raises(BadInput, match=r"run\.rrd: .*swarmwire-metrics\[view\]"):
+    with pytest.raises(BadInput, match=r"run\.rrd: .*swarmwire\[view\]"):
         RerunRecording(tmp_path / "run.rrd", Metrics(), StillClock())
 
 
