@@ -42,7 +42,10 @@ def order_queues(state, events, start):
 
 @kernel(from_python=True, nogil=True)
 def run_until(params, losses, state, events, buffer, max_links, until_ns, start, is_new):
-    """Handle the events due before `until_ns`; see `mac.run_until`."""
+    """Handle the events due before `until_ns`, after `order_queues` if packets are new.
+
+    Returns the time of the next event, NEVER_NS without one; or BUFFER_IS_FULL: call again with an empty `buffer`.
+    """
     rows = len(state.robot)
     jam = state.jam
     if is_new:
