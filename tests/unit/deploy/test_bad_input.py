@@ -196,6 +196,7 @@ OF_FILES = [  # an override by which something else in the file becomes wrong
 ]
 OF_COMMANDS = [
     ("run absent.toml", "absent.toml: expected a readable file: No such file or directory"),
+    (f"run {'x' * 300}", f"{'x' * 300}: expected a readable file: File name too long"),
     (f"run {LOSSY} --runners all", '--runners: expected "none", "per-robot" or 1 to 20 (the robots), got \'all\''),
     ("list nothing", f"nothing: expected one of {KINDS}; swarmwire describe NAME describes one name"),
     ("describe flokking", "flokking: nothing has this name; nearest: Flocking (swarmwire list names all)"),

@@ -9,6 +9,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, field
 from difflib import get_close_matches
 from enum import IntEnum
@@ -142,7 +143,10 @@ def folder_of(path: Path | str) -> Path:
 def scenario_path(path: Path | str) -> Path:
     """Return the path of a scenario's file: `scenario.toml` of a folder that has one, else the path itself."""
     file = Path(path, "scenario.toml")
-    return file if file.is_file() else Path(path)
+    with suppress(OSError):  # rights are missing, or the name is too long: the error comes where it is read
+        if file.is_file():
+            return file
+    return Path(path)
 
 
 def read_toml(path: Path, named_by: tuple[str, str] | None = None) -> dict[str, Any]:

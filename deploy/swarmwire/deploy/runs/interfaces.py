@@ -257,7 +257,8 @@ def enter_user_namespace() -> None:
     if may_make_namespaces():
         return
     if not os.access(DEVICE, os.R_OK | os.W_OK):
-        raise BadInput(KEY, "", missing_right(PermissionError(errno.EACCES, "", str(DEVICE))))
+        number = errno.EACCES if DEVICE.exists() else errno.ENOENT
+        raise BadInput(KEY, "", missing_right(OSError(number, "", str(DEVICE))))
     unshare = [shutil.which("unshare") or "unshare", *USER_NAMESPACE, "--"]
     try:
         allowed = subprocess.run([*unshare, "true"], capture_output=True, check=False).returncode == 0
@@ -265,6 +266,7 @@ def enter_user_namespace() -> None:
         raise BadInput(KEY, "", "expected root, or unshare of util-linux: sudo apt-get install util-linux") from None
     if not allowed:
         fix = "sudo sysctl kernel.unprivileged_userns_clone=1 kernel.apparmor_restrict_unprivileged_userns=0"
-        raise BadInput(KEY, "", f"expected root, or rights to make a user namespace: {fix}")
+        root = "expected root, in a container with --cap-add NET_ADMIN --cap-add SYS_ADMIN"
+        raise BadInput(KEY, "", f"{root}, or rights to make a user namespace: {fix}")
     sys.stdout.flush()
     os.execv(unshare[0], [*unshare, sys.executable, *sys.orig_argv[1:]])

@@ -183,7 +183,7 @@ def check_rights() -> None:
 def missing_right(error: OSError) -> str:
     """Describe the missing right, with the command that fixes it."""
     if error.filename == str(DEVICE) and error.errno in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
-        return f"expected {DEVICE}: sudo modprobe tun"
+        return f"expected {DEVICE}: sudo modprobe tun, and in a container --device {DEVICE}"
     if error.filename == str(DEVICE) and error.errno in (errno.EACCES, errno.EPERM):
         return f"expected rights to {DEVICE}: run as root, or sudo chmod 666 {DEVICE}"
     if error.errno == errno.EPERM:
