@@ -11,7 +11,8 @@ import pytest
 from swarmwire.comms.base.ethernet import FRAME_TAG, LATE_S, exchanged, station
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.observe.interfaces import SubtickMedium, SubtickPackets
-from swarmwire.comms.radio.config.radio import Interface, Radio, check_radio
+from swarmwire.comms.radio.config.checks import check_radio
+from swarmwire.comms.radio.config.radio import Interface, Radio
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets
 from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.ports import PortsBackend

@@ -13,7 +13,8 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.protocols.ros2.keys import RADIO_TOPICS, check_name
 from swarmwire.comms.protocols.ros2.relay import PART
 from swarmwire.comms.radio.config.antennas import check_pattern
-from swarmwire.comms.radio.config.radio import Radio, check_radio, check_spreading, unfit_for_torus
+from swarmwire.comms.radio.config.checks import check_radio, check_spreading, unfit_for_torus
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.world.actuation.actuators import noise_of
 from swarmwire.world.engines.physics import check_engines, engines_of

@@ -13,7 +13,8 @@ from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT
 from swarmwire.comms.radio import results
-from swarmwire.comms.radio.config.radio import Radio, unfit_for_torus
+from swarmwire.comms.radio.config.checks import unfit_for_torus
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext, in_space
 from swarmwire.comms.radio.counters import PacketCounters
 from swarmwire.comms.radio.disruption import Disruption

@@ -18,9 +18,10 @@ from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.analysis.coverage import RadioCoverage, coverage_map
 from swarmwire.comms.radio.config.antennas import Antenna, Antennas, GainTable, Pattern, RobotAntenna
+from swarmwire.comms.radio.config.checks import check_radio
 from swarmwire.comms.radio.config.impairments import Measures, RssiMeasure
 from swarmwire.comms.radio.config.phy import Reception
-from swarmwire.comms.radio.config.radio import Radio, check_radio
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import with_number
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import Disruption, Jammers

@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.radio.config.antennas import RobotAntenna
+from swarmwire.comms.radio.config.checks import check_spreading
 from swarmwire.comms.radio.config.frames import airtime_ns
 from swarmwire.comms.radio.config.lora import Lora
 from swarmwire.comms.radio.config.phy import Access
-from swarmwire.comms.radio.config.radio import Radio, check_spreading
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.phy.propagation import sensitivity_of
 from swarmwire.comms.radio.timing import lora_ns, lora_symbol_ns
 from swarmwire.comms.robot.packets import Fate

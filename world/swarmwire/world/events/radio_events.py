@@ -10,7 +10,8 @@ from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.sentinels import NO_ROBOT
-from swarmwire.comms.radio.config.radio import Radio, check_radio
+from swarmwire.comms.radio.config.checks import check_radio
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.config.ramps import ParameterRamp, check_number, radio_at
 from swarmwire.comms.radio.disruption import BACKLOGS, Jammers
 from swarmwire.world.events.effects import ActiveEffects, exclusive

@@ -15,16 +15,16 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.base.arrays import IntArray, KeyArray
-from swarmwire.comms.base.clock import NEVER_NS, to_ns
+from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.draws import purpose, uniform
 from swarmwire.comms.base.draws_compiled import uniform as compiled_uniform
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import BROADCAST, UNDER_WAY
-from swarmwire.comms.radio.config.phy import MAX_CHANNELS, Advertising
+from swarmwire.comms.radio.config.phy import Advertising
 from swarmwire.comms.radio.config.radio import Radio
-from swarmwire.comms.radio.phy import jamming, mac, reception, results, tx_queue
-from swarmwire.comms.radio.phy.event_queue import ENQUEUE, OFF_AIR, SEND, cancel, schedule
-from swarmwire.comms.radio.phy.mac import BUFFER_IS_FULL, MAX_EXTRA_ROWS, use_current_links
+from swarmwire.comms.radio.phy import mac, reception, results, tx_queue
+from swarmwire.comms.radio.phy.event_queue import ENQUEUE, NO_EVENT, OFF_AIR, SEND, schedule
+from swarmwire.comms.radio.phy.mac import next_event, use_current_links
 from swarmwire.comms.radio.phy.params import FOREVER_NS
 from swarmwire.comms.radio.phy.state import DATA, RECEIVING, SENDING, SILENT, SUSPENDED, PhyState
 from swarmwire.comms.robot.packets import Fate
@@ -210,27 +210,14 @@ def _end_event(timing, state, params, events, buffer, r, now_ns):
 
 @kernel(from_python=True, nogil=True)
 def run_until(params, timing, losses, state, events, buffer, max_links, until_ns, start, is_new):
-    """Handle the events due before `until_ns`, as `mac.run_until` does."""
-    rows = len(state.robot)
-    jam = state.jam
+    """Handle the events due before `until_ns`, after `order_queues` if packets are new.
+
+    Returns the time of the next event, NEVER_NS or BUFFER_IS_FULL, see `next_event`.
+    """
     if is_new:
         order_queues(state, events, start)
-    while events.size[0] > 0 or jam.next[0] < len(jam.at_ns):
-        event = events.heap[0]
-        now_ns = events.at_ns[event] if events.size[0] > 0 else until_ns
-        if jam.next[0] < len(jam.at_ns) and jam.at_ns[jam.next[0]] <= now_ns:
-            arena, at_ns = jam.arena[jam.jammer[jam.next[0]]], jam.at_ns[jam.next[0]]
-            jamming.toggle(params, on_channel(state, 0), events)
-            for channel in range(1, MAX_CHANNELS):
-                jamming.refresh_arena(params, on_channel(state, channel), events, arena, at_ns)
-            continue
-        if now_ns >= until_ns:
-            break
-        kind, r = event // rows, event % rows
-        queued = state.robot[r].stop - state.robot[r].next
-        if buffer.count[0] + max_links + queued + MAX_EXTRA_ROWS > len(buffer.packet):
-            return BUFFER_IS_FULL
-        cancel(events, kind, r)
+    kind, r, now_ns = next_event(params, state, events, buffer, max_links, until_ns)
+    while kind != NO_EVENT:
         if kind == ENQUEUE:
             tx_queue.enqueue(params, state, events, buffer, r, now_ns)
         elif kind == SEND:
@@ -239,7 +226,8 @@ def run_until(params, timing, losses, state, events, buffer, max_links, until_ns
             schedule(events, SEND, r, now_ns)  # after frames that end now
         else:
             _pdu_ended(params, timing, losses, state, events, buffer, r, now_ns)
-    return events.at_ns[events.heap[0]] if events.size[0] > 0 else NEVER_NS
+        kind, r, now_ns = next_event(params, state, events, buffer, max_links, until_ns)
+    return now_ns
 
 
 @kernel(from_python=True)

@@ -20,15 +20,16 @@ from typing import NamedTuple
 import numpy as np
 
 from swarmwire.comms.base.arrays import BoolArray, IntArray
-from swarmwire.comms.base.clock import NEVER_NS, to_ns
+from swarmwire.comms.base.clock import to_ns
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import BROADCAST, NO_FATE, NO_PACKET
 from swarmwire.comms.radio.config.frames import acknowledgement_bytes, acknowledgement_ns, frame_bits
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import DROP
-from swarmwire.comms.radio.phy import jamming, reception, results, tx_queue
+from swarmwire.comms.radio.phy import reception, results, tx_queue
 from swarmwire.comms.radio.phy.event_queue import (
     ENQUEUE,
+    NO_EVENT,
     NOT_SCHEDULED_NS,
     OFF_AIR,
     SEND,
@@ -38,7 +39,7 @@ from swarmwire.comms.radio.phy.event_queue import (
     due_ns,
     schedule,
 )
-from swarmwire.comms.radio.phy.mac import BUFFER_IS_FULL, MAX_EXTRA_ROWS, order_queues, use_current_links
+from swarmwire.comms.radio.phy.mac import next_event, order_queues, use_current_links
 from swarmwire.comms.radio.phy.state import BACKING_OFF, DATA, IDLE, NO_RESULT, SENDING, SILENT, SPACING
 from swarmwire.comms.radio.timing import ESB
 from swarmwire.comms.robot.packets import Fate, TxResult
@@ -108,28 +109,18 @@ def are_linked(polling: Polling, a: IntArray, b: IntArray) -> BoolArray:
 
 @kernel(from_python=True, nogil=True)
 def run_until(params, timing, polling, losses, state, events, buffer, max_links, from_ns, until_ns, start, is_new):
-    """Handle the events due before `until_ns`, as `mac.run_until` does; nothing has happened since `from_ns`."""
-    rows = len(state.robot)
-    jam = state.jam
+    """Handle the events due before `until_ns`, after `order_queues` if packets are new; none was since `from_ns`.
+
+    Returns the time of the next event, NEVER_NS or BUFFER_IS_FULL, see `next_event`.
+    """
     if is_new:
         order_queues(state, events, start)
-        for r in range(rows):
+        for r in range(len(state.robot)):
             if polling.station[r] == r:
                 state.robot[r].mac_state = SPACING
                 _wake(polling, state, events, buffer, r, from_ns)
-    while events.size[0] > 0 or jam.next[0] < len(jam.at_ns):
-        event = events.heap[0]
-        now_ns = events.at_ns[event] if events.size[0] > 0 else until_ns
-        if jam.next[0] < len(jam.at_ns) and jam.at_ns[jam.next[0]] <= now_ns:
-            jamming.toggle(params, state, events)
-            continue
-        if now_ns >= until_ns:
-            break
-        kind, r = event // rows, event % rows
-        queued = state.robot[r].stop - state.robot[r].next
-        if buffer.count[0] + max_links + queued + MAX_EXTRA_ROWS > len(buffer.packet):
-            return BUFFER_IS_FULL
-        cancel(events, kind, r)
+    kind, r, now_ns = next_event(params, state, events, buffer, max_links, until_ns)
+    while kind != NO_EVENT:
         is_station = polling.station[r] == r
         if kind == ENQUEUE:
             tx_queue.enqueue(params, state, events, buffer, r, now_ns)
@@ -151,7 +142,8 @@ def run_until(params, timing, polling, losses, state, events, buffer, max_links,
             _ard_ended(params, timing, polling, state, events, buffer, r, now_ns)
         else:
             _begin_exchange(params, timing, polling, state, events, buffer, r, now_ns)
-    return events.at_ns[events.heap[0]] if events.size[0] > 0 else NEVER_NS
+        kind, r, now_ns = next_event(params, state, events, buffer, max_links, until_ns)
+    return now_ns
 
 
 @kernel(from_python=True)

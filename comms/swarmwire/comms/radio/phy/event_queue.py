@@ -13,6 +13,7 @@ from swarmwire.comms.base.sentinels import ABSENT
 # Kinds, in the order of events at equal times: frames end before others start.
 OFF_AIR, CCA_END, TIMER, SEND, SEND_ACK, ENQUEUE = range(6)
 KINDS = 6
+NO_EVENT = -1  # kind where no event is due
 NOT_SCHEDULED_NS = -1  # time of an event that is not scheduled
 
 

@@ -121,7 +121,7 @@ def _powers(jammers, position, x, y, z, robots, obstacles, propagation):
 def refresh(params, state, events, now_ns):
     """Recompute the noise of all robots after a change of jammers, their power or the PHY parameters."""
     for arena in range(len(state.keys)):
-        refresh_arena(params, state, events, arena, now_ns)
+        _refresh_arena(params, state, events, arena, now_ns)
 
 
 @kernel()
@@ -132,11 +132,11 @@ def toggle(params, state, events):
     jam.next[0] += 1
     jammer = jam.jammer[i]
     jam.is_on[jammer] = not jam.is_on[jammer]
-    refresh_arena(params, state, events, jam.arena[jammer], jam.at_ns[i])
+    _refresh_arena(params, state, events, jam.arena[jammer], jam.at_ns[i])
 
 
 @kernel()
-def refresh_arena(params, state, events, arena, now_ns):
+def _refresh_arena(params, state, events, arena, now_ns):
     """Recompute the noise of an arena's robots."""
     jam = state.jam
     for i in range(params.robots):
@@ -145,7 +145,8 @@ def refresh_arena(params, state, events, arena, now_ns):
         for j in range(len(jam.arena)):
             if jam.arena[j] == arena and jam.is_on[j]:
                 jam_mw += jam.power_mw[j, i]
-        rx = state.reception[r]
-        end_chunk(state.ht, params, state.robot, rx, r, now_ns)
-        rx.jam_mw = jam_mw
+        for row in range(r, len(state.reception), len(state.robot)):  # on each channel
+            rx = state.reception[row]
+            end_chunk(state.ht, params, state.robot, rx, r, now_ns)
+            rx.jam_mw = jam_mw
         dcf.sense(params, state, events, r, now_ns)

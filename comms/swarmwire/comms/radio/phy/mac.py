@@ -13,7 +13,7 @@ from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import BROADCAST, NO_PACKET, NO_ROBOT, UNDER_WAY
 from swarmwire.comms.radio.phy import csma, dcf, duty_cycle, jamming, reception, results, tx_queue
-from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, OFF_AIR, SEND, TIMER, cancel, schedule
+from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, NO_EVENT, OFF_AIR, SEND, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.state import (
     ACKNOWLEDGEMENT,
     AWAITING_ACK,
@@ -212,30 +212,43 @@ def order_queues(state, events, start):
             schedule(events, ENQUEUE, r, state.packet[state.order[i]].sent_at_ns)
 
 
+@kernel()
+def next_event(params, state, events, buffer, max_links, until_ns):
+    """Take the next event before `until_ns` off the queue; switch the jammers that switch until then.
+
+    Returns its kind, robot row and time. Without one: NO_EVENT, NO_ROBOT and what a `run_until` returns, which is the
+    time of the first event later on, NEVER_NS without one; or BUFFER_IS_FULL: call again with an empty `buffer`. No
+    robot has more than `max_links` links.
+    """
+    jam = state.jam
+    while jam.next[0] < len(jam.at_ns):  # all switching times are before `until_ns`
+        if events.size[0] > 0 and events.at_ns[events.heap[0]] < jam.at_ns[jam.next[0]]:
+            break
+        jamming.toggle(params, state, events)
+    if events.size[0] == 0:
+        return NO_EVENT, NO_ROBOT, NEVER_NS
+    event, rows = events.heap[0], len(state.robot)
+    now_ns = events.at_ns[event]
+    if now_ns >= until_ns:
+        return NO_EVENT, NO_ROBOT, now_ns
+    kind, r = event // rows, event % rows
+    queued = state.robot[r].stop - state.robot[r].next
+    if buffer.count[0] + max_links + queued + MAX_EXTRA_ROWS > len(buffer.packet):
+        return NO_EVENT, NO_ROBOT, BUFFER_IS_FULL
+    cancel(events, kind, r)
+    return kind, r, now_ns
+
+
 @kernel(from_python=True, nogil=True)
 def run_until(params, losses, state, events, buffer, max_links, until_ns, start, is_new):
     """Handle the events due before `until_ns`, after `order_queues` if packets are new.
 
-    Returns the time of the next event, NEVER_NS without one; or BUFFER_IS_FULL: call again with an empty `buffer`. No
-    robot has more than `max_links` links.
+    Returns the time of the next event, NEVER_NS or BUFFER_IS_FULL, see `next_event`.
     """
-    rows = len(state.robot)
-    jam = state.jam
     if is_new:
         order_queues(state, events, start)
-    while events.size[0] > 0 or jam.next[0] < len(jam.at_ns):
-        event = events.heap[0]
-        now_ns = events.at_ns[event] if events.size[0] > 0 else until_ns
-        if jam.next[0] < len(jam.at_ns) and jam.at_ns[jam.next[0]] <= now_ns:
-            jamming.toggle(params, state, events)  # all switching times are before `until_ns`
-            continue
-        if now_ns >= until_ns:
-            break
-        kind, r = event // rows, event % rows
-        queued = state.robot[r].stop - state.robot[r].next
-        if buffer.count[0] + max_links + queued + MAX_EXTRA_ROWS > len(buffer.packet):
-            return BUFFER_IS_FULL
-        cancel(events, kind, r)
+    kind, r, now_ns = next_event(params, state, events, buffer, max_links, until_ns)
+    while kind != NO_EVENT:
         if kind == OFF_AIR:
             frame_ended(params, losses, state, events, buffer, r, now_ns)
         elif kind == CCA_END:
@@ -248,7 +261,8 @@ def run_until(params, losses, state, events, buffer, max_links, until_ns, start,
             tx_queue.enqueue(params, state, events, buffer, r, now_ns)
         else:
             send_ack(params, state, events, r, now_ns)
-    return events.at_ns[events.heap[0]] if events.size[0] > 0 else NEVER_NS
+        kind, r, now_ns = next_event(params, state, events, buffer, max_links, until_ns)
+    return now_ns
 
 
 @kernel(from_python=True)

@@ -295,10 +295,7 @@ class SinrPhy(RadioModel):
 
     def _refresh(self) -> None:
         """Recompute the noise of all robots, before or after a change of its sources."""
-        state, rows = self._state(self._switch, self._now_ns), len(self._robot)
-        for first in range(0, len(self._reception), rows):  # of each channel
-            on_channel = state._replace(reception=self._reception[first : first + rows])
-            jamming.refresh(self._params, on_channel, self._events, self._now_ns)
+        jamming.refresh(self._params, self._state(self._switch, self._now_ns), self._events, self._now_ns)
 
     def _advertising_timing(self) -> advertising.AdvertisingTiming:
         return advertising.advertising_timing(self._radio, self._context.keys, self._context.robots)

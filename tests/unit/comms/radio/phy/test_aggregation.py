@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.radio.config.radio import Radio, check_radio
+from swarmwire.comms.radio.config.checks import check_radio
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
 from tests.support.comms.radio import TICK_NS, Run, at, living, make_medium, packets, run, run_disrupted
 from tests.unit.world.scenario.test_bodies import radio_of

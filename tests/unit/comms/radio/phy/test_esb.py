@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.draws import derive_key
+from swarmwire.comms.radio.config.checks import check_radio
 from swarmwire.comms.radio.config.frames import airtime_ns
 from swarmwire.comms.radio.config.phy import Access
-from swarmwire.comms.radio.config.radio import Radio, check_radio
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.medium import RadioMedium

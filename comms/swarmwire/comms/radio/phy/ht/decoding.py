@@ -67,8 +67,8 @@ def fate_of_frame(params, losses, state, s, i):
     if header != RECEIVED:
         return header
     data_ns = sender.airtime_ns - HT_PREAMBLE_NS - params.ht.extension_ns
-    fate, left, k = RECEIVED, station.count, station.first
-    while left > 0:
+    fate, remaining, k = RECEIVED, station.count, station.first
+    while remaining > 0:
         packet = state.packet[state.order[k]]
         k += 1
         if packet.is_in_ppdu == 0:
@@ -79,8 +79,8 @@ def fate_of_frame(params, losses, state, s, i):
         this = _fate(
             params, losses, state, s, i, first_ns, end_ns, packet.bits, sender.rate, packet.sequence, MPDU, attempt
         )
-        fate = this if left == station.count or this == RECEIVED else fate
-        left -= 1
+        fate = this if remaining == station.count or this == RECEIVED else fate
+        remaining -= 1
         if r == sender.to:
             packet.last_fate = this
         elif fate == RECEIVED:

@@ -5,17 +5,16 @@ The functions that Python calls have the names of those in `mac.py`, which has t
 
 # pyright: basic, reportUnknownMemberType=false
 
-from swarmwire.comms.base.clock import NEVER_NS
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import NO_PACKET, NO_ROBOT
 from swarmwire.comms.radio.disruption import DROP, NEWEST
-from swarmwire.comms.radio.phy import jamming, mac
-from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, OFF_AIR, SEND, SEND_ACK, TIMER, cancel
+from swarmwire.comms.radio.phy import mac
+from swarmwire.comms.radio.phy.event_queue import CCA_END, ENQUEUE, NO_EVENT, OFF_AIR, SEND, SEND_ACK, TIMER, cancel
 from swarmwire.comms.radio.phy.ht import ppdu
 from swarmwire.comms.radio.phy.ht.exchange import SENDER_DEAD, frame_ended, send
 from swarmwire.comms.radio.phy.ht.responses import NAV_RESET, reset_nav, respond, timer_expired
 from swarmwire.comms.radio.phy.ht.station import TOO_LARGE, begin, enqueue
-from swarmwire.comms.radio.phy.mac import BUFFER_IS_FULL, MAX_EXTRA_ROWS, end_receptions
+from swarmwire.comms.radio.phy.mac import end_receptions, next_event
 from swarmwire.comms.radio.phy.state import BACKING_OFF, DATA, IDLE, NO_RESULT, SENDING, SUSPENDED, TURNAROUND
 
 __all__ = ["end_receptions", "order_queues", "run_until", "stop_dead", "switch"]
@@ -44,25 +43,12 @@ def order_queues(state, events, start):
 def run_until(params, losses, state, events, buffer, max_links, until_ns, start, is_new):
     """Handle the events due before `until_ns`, after `order_queues` if packets are new.
 
-    Returns the time of the next event, NEVER_NS without one; or BUFFER_IS_FULL: call again with an empty `buffer`.
+    Returns the time of the next event, NEVER_NS or BUFFER_IS_FULL, see `next_event`.
     """
-    rows = len(state.robot)
-    jam = state.jam
     if is_new:
         order_queues(state, events, start)
-    while events.size[0] > 0 or jam.next[0] < len(jam.at_ns):
-        event = events.heap[0]
-        now_ns = events.at_ns[event] if events.size[0] > 0 else until_ns
-        if jam.next[0] < len(jam.at_ns) and jam.at_ns[jam.next[0]] <= now_ns:
-            jamming.toggle(params, state, events)
-            continue
-        if now_ns >= until_ns:
-            break
-        kind, r = event // rows, event % rows
-        queued = state.robot[r].stop - state.robot[r].next
-        if buffer.count[0] + max_links + queued + MAX_EXTRA_ROWS > len(buffer.packet):
-            return BUFFER_IS_FULL
-        cancel(events, kind, r)
+    kind, r, now_ns = next_event(params, state, events, buffer, max_links, until_ns)
+    while kind != NO_EVENT:
         if kind == OFF_AIR:
             frame_ended(params, losses, state, events, buffer, r, now_ns)
         elif kind == NAV_RESET:
@@ -75,7 +61,8 @@ def run_until(params, losses, state, events, buffer, max_links, until_ns, start,
             enqueue(params, state, events, buffer, r, now_ns)
         else:
             respond(params, state, events, r, now_ns)
-    return events.at_ns[events.heap[0]] if events.size[0] > 0 else NEVER_NS
+        kind, r, now_ns = next_event(params, state, events, buffer, max_links, until_ns)
+    return now_ns
 
 
 @kernel(from_python=True)

@@ -82,12 +82,12 @@ def send(params, state, events, buffer, r, now_ns):
         put_on_air(params, state, events, r, now_ns, RTS, BASIC_RATE, RTS_BYTES, duration_ns)
         return
     station.awaits = ACKNOWLEDGEMENT if station.count == 1 else BLOCK_ACK
-    left, k = station.count, station.first
-    while left > 0:
+    remaining, k = station.count, station.first
+    while remaining > 0:
         packet = state.packet[state.order[k]]
         k += 1
         if packet.is_in_ppdu:
-            left -= 1
+            remaining -= 1
             packet.attempts += 1
             packet.on_air_at_ns, packet.airtime_ns, packet.last_fate = now_ns, airtime_ns, RECEIVED
     put_on_air(params, state, events, r, now_ns, DATA, station.rate, station.psdu_bytes, response_ns)
@@ -157,13 +157,13 @@ def _record(state, buffer, r, i, now_ns):
     if robot.to == BROADCAST:
         results.record_broadcast(state, buffer, r, now_ns)
         return True
-    is_any, left, k = False, station.count, station.first
-    while left > 0:
+    is_any, remaining, k = False, station.count, station.first
+    while remaining > 0:
         packet = state.packet[state.order[k]]
         k += 1
         if packet.is_in_ppdu == 0:
             continue
-        left -= 1
+        remaining -= 1
         if i == ABSENT:
             packet.last_fate = NO_FATE
             continue
@@ -183,11 +183,11 @@ def _end_unanswered(params, state, events, buffer, r, now_ns):
     """End the packets of a PPDU to which no response is due, and those of a sender that died."""
     robot, station = state.robot[r], state.ht.station[r]
     is_dead = state.packet[robot.packet].result == NO_RESULT
-    left, k = station.count, station.first
-    while left > 0:
+    remaining, k = station.count, station.first
+    while remaining > 0:
         packet = state.packet[state.order[k]]
         if packet.is_in_ppdu:
-            left -= 1
+            remaining -= 1
             packet.is_in_ppdu = 0
             if robot.to == BROADCAST:
                 packet.is_done = 1

@@ -73,10 +73,10 @@ def build(params, state, r, first):
 def dissolve(state, r):
     """Return the MPDUs of the PPDU to the queue."""
     station = state.ht.station[r]
-    left, k = station.count, station.first
-    while left > 0:
+    remaining, k = station.count, station.first
+    while remaining > 0:
         packet = state.packet[state.order[k]]
-        left -= packet.is_in_ppdu
+        remaining -= packet.is_in_ppdu
         packet.is_in_ppdu = 0
         k += 1
     station.count = 0
@@ -86,7 +86,7 @@ def dissolve(state, r):
 def acknowledge(state, s, r, is_block):
     """Note that robot s knows what robot r received; return the share of the PPDU."""
     robot, station = state.robot[s], state.ht.station[s]
-    received, left = 0, station.count
+    received, members = 0, station.count
     for k in range(robot.next, robot.enqueue_next):
         packet = state.packet[state.order[k]]
         if packet.to != r or packet.is_done or packet.is_acked:
@@ -101,7 +101,7 @@ def acknowledge(state, s, r, is_block):
     dissolve(state, s)
     if station.request_to == r:
         station.request_to = NO_ROBOT
-    return received / max(left, 1)
+    return received / max(members, 1)
 
 
 @kernel()
