@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +127,13 @@ def test_mp4_is_of_the_given_time_and_speed(run, tmp_path):
     told = export(run, "--to", to, "--from", "1", "--until", "2", "--fps", "5", "--speed", "0.5", *SMALL)
     assert told.splitlines()[0] == "11 frames, 5 a second, 0.5 x real time"
     assert imageio_ffmpeg.count_frames_and_secs(str(to)) == (11, pytest.approx(2.2))
+
+
+def test_mp4_without_the_encoder_is_refused_before_a_frame_is_drawn(run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    monkeypatch.setattr(export_pictures, "RunFolder", None)  # to call it would be another error
+    with pytest.raises(BadInput, match=r"swarmwire\[film\]"):
+        export(run, "--to", run / "film.mp4", *SMALL)
 
 
 def test_export_of_a_killed_run_reaches_to_its_last_part(run):

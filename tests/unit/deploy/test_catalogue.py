@@ -246,6 +246,13 @@ def test_bodies_and_agents_of_a_user_are_described_as_shipped_ones(tmp_path, mon
     assert_tells(sealer, [("kind", "gas.py:Sealer"), ("arm_m", "m", "0.3")])
 
 
+def test_metric_of_a_user_is_described_with_its_form_in_a_scenario_and_what_is_neither_is_refused(monkeypatch):
+    monkeypatch.chdir(ROOT / "examples" / "gas")
+    assert_tells(printed(find("sealing.py:Sealing")), [("measured", '["sealing.py:Sealing"]'), ("bounds", "0 to 1")])
+    with refused_input("gas.py:Gas", match="no Agent or VectorAgent"):
+        find("gas.py:Gas")
+
+
 def test_metrics_of_packages_are_listed_and_described_also_if_they_do_not_import(tmp_path, monkeypatch, capsys):
     install(tmp_path, "sky_metrics", {"east": "East"})
     install(tmp_path, "fog_metrics", {"west": "East"}, code="raise ValueError('fog')")

@@ -61,6 +61,17 @@ class Keeper(Watcher):
         self.metrics.append({name: values.copy() for name, values in self._metrics.latest.items()})
 
 
+@pytest.mark.parametrize("named", ["my_swarm", "my_swarm/scenario.toml", "other.toml"])
+def test_default_folder_has_the_name_of_the_scenario_or_of_its_folder(tmp_path, monkeypatch, named):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_swarm").mkdir()
+    for file in ("my_swarm/scenario.toml", "other.toml"):
+        (tmp_path / file).write_text(LOSSY.read_text())
+    assert called("run", named, "--set", "duration_s=0.2", "--no-rrd", "--quiet").exit_code == 0
+    [folder] = (tmp_path / "runs").iterdir()
+    assert folder.name.startswith("other-s1-" if named == "other.toml" else "my_swarm-s1-")
+
+
 def test_recorded_tables_equal_the_observers_view_and_the_summary(tmp_path):
     (tmp_path / "stating.py").write_text(STATING)
     folder, keeper = tmp_path / "run", Keeper()

@@ -18,7 +18,7 @@ from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.campaigns.worker import Task, TaskResult
 from swarmwire.deploy.runs.config import SeedsOption, parse_factor, seed_list
 from swarmwire.deploy.runs.controls import Interrupt
-from swarmwire.deploy.runs.record.folder import stamped_folder
+from swarmwire.deploy.runs.record.folder import short_name, stamped_folder
 from swarmwire.deploy.runs.record.provenance import Copies
 from swarmwire.metrics.records.campaign.campaign_json import (
     FAILED,
@@ -292,4 +292,4 @@ def _failed(ended: Mapping[int, str]) -> int:
 
 def _stem(scenario: Scenario | Path | str) -> str:
     """Return the first part of the default folder's name."""
-    return "campaign" if isinstance(scenario, Scenario) else Path(scenario).stem
+    return "campaign" if isinstance(scenario, Scenario) else short_name(Path(scenario))

@@ -43,13 +43,14 @@ def describe_command(
     name: Annotated[
         str,
         typer.Argument(
-            help="A name that `swarmwire list` prints, an agent class or a body's sheet of your own.", metavar="NAME"
+            help="A name that `swarmwire list` prints, an agent's or metric's class, or a body's sheet, of your own.",
+            metavar="NAME",
         ),
     ],
 ) -> None:
     """Describe one name: its purpose, its parameters with unit, default and bounds, and the source of its numbers.
 
-    For example a body, a key of a scenario, one of two things of the same name, an agent and a body of your own:
+    For example a body, a key of a scenario, one of two things of the same name; an agent, a metric and a body of yours:
 
       swarmwire describe epuck
 
@@ -58,6 +59,8 @@ def describe_command(
       swarmwire describe event:blackout
 
       swarmwire describe my_agent.py:Mine
+
+      swarmwire describe spread.py:Spread
 
       swarmwire describe mine.toml
     """

@@ -112,6 +112,14 @@ def test_real_time_rows_agree_on_requested_and_reached_factor(result):
     assert rows({}) == (speed, "asked for x 1; 2 of 600 ticks missed, worst lag 9.99 s")
 
 
+@pytest.mark.parametrize(
+    ("started", "expected"), [(2, "2 processes, lockstep"), (0, "2 runners that joined, lockstep")]
+)
+def test_robots_row_names_processes_of_the_run_or_runners_that_joined_it(result, started, expected):
+    facts = replace(result.facts, runners=started)
+    assert row(shown(replace(result, runners=2, mode="lockstep", facts=facts)), "robots") == f"20, {expected}"
+
+
 class Campaign:
     name, points, seeds, runs = "a [bold] flock", [{}, {}], list(range(50)), 100
 

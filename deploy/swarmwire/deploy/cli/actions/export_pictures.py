@@ -7,6 +7,7 @@ from rich.progress import track
 
 from swarmwire.comms.base.atomic import check_output_path, output_file
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.extras import FILM
 from swarmwire.deploy.cli.exporters import ExportOptions
 from swarmwire.deploy.terminal.console import TerminalConsole
 from swarmwire.metrics.pictures.drawing.animation import FilmFigure, write_gif, write_mp4
@@ -65,6 +66,7 @@ def write_gif_film(run: Path, to: Path, options: ExportOptions) -> str:
 
 def write_mp4_film(run: Path, to: Path, options: ExportOptions) -> str:
     """Write a film as MP4."""
+    FILM.need("films as .mp4")  # before the frames are drawn
     return _write_film("mp4", run, to, options)
 
 

@@ -24,7 +24,7 @@ def build_kernels(scenarios: Sequence[Path]) -> None:
         chosen = scenarios or [new_swarm(Path(folder, "swarm"))[0].parent]
         for number, scenario in enumerate(chosen):
             name = str(scenario) if scenarios else "a new swarm"
-            echo(f"{name}: compiling for {PORTABLE_CPU} ...")
+            echo(f"{name}: compiling for {PORTABLE_CPU}, for a minute or so ...")
             words = ["run", str(scenario), "--set", SHORT, "--quiet", "--out", str(Path(folder, f"run-{number}"))]
             command = [sys.executable, "-m", "swarmwire.deploy", *words]
             done = subprocess.run(command, check=False, env=os.environ | PORTABLE_VARIABLES, stdout=subprocess.DEVNULL)

@@ -62,7 +62,7 @@ def run_config(scenario: Scenario, start: StartOptions, recording: PacketOptions
     return RunConfig(
         scenario,
         seeds=seeds,
-        out=start.out or default_folder(Path(scenario.source).stem, seeds),
+        out=start.out or default_folder(Path(scenario.source), seeds),
         realtime=start.realtime,
         subtick=start.subtick,
         record=record_settings(recording),

@@ -19,7 +19,7 @@ from swarmwire.deploy.machine import command_path
 from swarmwire.deploy.runs.config import SEEDS, parse_factor, seed_list
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.interfaces import enter_user_namespace
-from swarmwire.deploy.runs.record.folder import stamped_folder
+from swarmwire.deploy.runs.record.folder import short_name, stamped_folder
 from swarmwire.deploy.terminal.console import TerminalConsole
 
 
@@ -38,7 +38,7 @@ def run_sweep(options: SweepOptions) -> None:
         elif plan is None or options.source is None:
             raise BadInput("SCENARIO", "", "is missing: expected a scenario or a campaign, or --resume with a folder")
         else:
-            folder = options.out or stamped_folder(Path(CAMPAIGNS, options.source.stem))
+            folder = options.out or stamped_folder(Path(CAMPAIGNS, short_name(options.source)))
             sweep = begin_sweep(plan, folder, shlex.join(["swarmwire", *sys.argv[1:]]), execution)
     print_sweep(sweep, console, command_path())
     if not sweep.is_over:

@@ -16,7 +16,7 @@ from swarmwire.deploy.cli.sweep import CHECK_SEEDS, PARALLEL_TRIALS, SAMPLER_SEE
 from swarmwire.deploy.machine import command_path
 from swarmwire.deploy.runs.config import seed_list
 from swarmwire.deploy.runs.controls import Interrupt
-from swarmwire.deploy.runs.record.folder import stamped_folder
+from swarmwire.deploy.runs.record.folder import short_name, stamped_folder
 from swarmwire.deploy.terminal.console import TerminalConsole
 
 
@@ -27,7 +27,7 @@ def tune_scenario(options: TuneOptions) -> None:
     with leaving_when_hung_up(interrupt):
         if options.resume is None:
             plan = _plan(options)
-            folder = options.out or stamped_folder(Path(TUNINGS, plan.spec.scenario.stem))
+            folder = options.out or stamped_folder(Path(TUNINGS, short_name(plan.spec.scenario)))
             tuned = begin_tune(plan, folder, shlex.join(["swarmwire", *sys.argv[1:]]), options.workers, observers)
         else:
             _refuse_with_resume(options)

@@ -16,9 +16,11 @@ from rich.text import Text
 
 from swarmwire.comms.base.config import did_you_mean
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import NotLoaded, load_named, resolve
 from swarmwire.deploy.cli.catalogue.agents import behaviour, behaviours, drivers, gateways, message_fields
 from swarmwire.deploy.cli.catalogue.robots import bodies, body_of, drives, sensors, sheet_keys
 from swarmwire.deploy.cli.catalogue.scenario import (
+    custom_metric,
     engines,
     events,
     fates,
@@ -30,6 +32,7 @@ from swarmwire.deploy.cli.catalogue.scenario import (
 )
 from swarmwire.deploy.cli.catalogue.schema import CatalogueEntry, CatalogueParameter, ParameterTable
 from swarmwire.deploy.terminal.console import aligned
+from swarmwire.metrics.measures.metric import Metric
 from swarmwire.world.scenario.bodies import sheet_path
 
 
@@ -73,10 +76,10 @@ def kind_named(name: str) -> Kind:
 
 
 def find(name: str) -> CatalogueEntry:
-    """Return the entry of a name: "name", "kind:name", an agent "module:Class" or "file.py:Class", or a "sheet.toml".
+    """Return the entry of a name: "name", "kind:name", a class "module:Class" or "file.py:Class", or a "sheet.toml".
 
-    A key of a scenario may be shortened to its last parts, and may have a group's name for `*`. BadInput for an unknown
-    name, with the nearest names, and for a name of several entries.
+    The class is an agent's or a metric's. A key of a scenario may be shortened to its last parts, and may have a
+    group's name for `*`. BadInput for an unknown name, with the nearest names, and for a name of several entries.
     """
     if sheet_path(name, ""):
         return body_of(Path(name))
@@ -85,7 +88,7 @@ def find(name: str) -> CatalogueEntry:
     prefix, colon, suffix = name.partition(":")
     chosen = [kind for kind in KINDS if colon and prefix.lower() in (kind.name, kind.singular)]
     if colon and not chosen:
-        return behaviour(name)
+        return _custom(name)
     entries = [entry for kind in chosen or KINDS for entry in kind.entries()]
     query = suffix if chosen else name
     matches = (
@@ -98,6 +101,15 @@ def find(name: str) -> CatalogueEntry:
     if len(matches) > 1:
         raise BadInput(name, "", f"several things have this name; say which: {', '.join(_full_names(matches))}")
     return matches[0]
+
+
+def _custom(spec: str) -> CatalogueEntry:
+    """Return the agent or the metric of "module:Class" or "file.py:Class", relative to the working directory."""
+    try:
+        kind = load_named(resolve(spec, Path.cwd()))
+    except NotLoaded:
+        kind = None  # as an agent, the error gives the reason
+    return custom_metric(spec) if isinstance(kind, type) and issubclass(kind, Metric) else behaviour(spec)
 
 
 def _matches(name: str, query: str, ends: bool = False) -> bool:

@@ -6,12 +6,14 @@ from abc import ABC
 from dataclasses import fields, replace
 from functools import cache
 from math import isinf
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from swarmwire.comms.base.config import bounds_of
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.plugins import resolve
 from swarmwire.comms.radio.config.frames import airtime_ns
 from swarmwire.comms.radio.config.presets import PRESETS, Preset
 from swarmwire.comms.radio.phy.propagation import range_of
@@ -29,7 +31,7 @@ from swarmwire.deploy.cli.catalogue.schema import (
 from swarmwire.deploy.runs.scenario_parts import radio_of
 from swarmwire.deploy.terminal.output import first_line, flowing, texts_of
 from swarmwire.metrics.measures.metric import Metric
-from swarmwire.metrics.measures.registry import ENTRY_POINT_GROUP, METRICS, PlugIn, plug_ins
+from swarmwire.metrics.measures.registry import ENTRY_POINT_GROUP, METRICS, PlugIn, custom_metric_class, plug_ins
 from swarmwire.world.engines.physics import ENGINES
 from swarmwire.world.events import ACTIONS
 from swarmwire.world.events.event import Event
@@ -198,6 +200,11 @@ def metrics() -> list[CatalogueEntry]:
     return [*built_in, *(_plug_in(plug_in) for plug_in in plug_ins().values() if plug_in.name not in METRICS)]
 
 
+def custom_metric(spec: str) -> CatalogueEntry:
+    """Return a user's metric, "module:Class" or "file.py:Class" in the working directory; BadInput if it is none."""
+    return _metric(custom_metric_class(resolve(spec, Path.cwd()), spec, ""), "custom", spec=spec)
+
+
 def _plug_in(plug_in: PlugIn) -> CatalogueEntry:
     try:
         return _metric(plug_in.kind("", ""), "plug-in", ("brought by", f"{plug_in.package}, as {plug_in.spec}"))
@@ -208,14 +215,14 @@ def _plug_in(plug_in: PlugIn) -> CatalogueEntry:
         )
 
 
-def _metric(kind: type[Metric], mark: str, *facts: tuple[str, str]) -> CatalogueEntry:
+def _metric(kind: type[Metric], mark: str, *facts: tuple[str, str], spec: str = "") -> CatalogueEntry:
     parameters = parameters_of_dataclass(kind)
     return CatalogueEntry(
         kind="metric",
         name=kind.name,
         help=kind.help,
         facts=(
-            ("measured", _measured(kind, mark)),
+            ("measured", _measured(kind, mark, spec or kind.name)),
             ("in summary.json", f"metrics.{kind.name}: final, mean, min and max over the ticks"),
             ("kind", METRIC_KINDS[kind.kind]),
             ("unit", kind.unit or "none"),
@@ -228,14 +235,14 @@ def _metric(kind: type[Metric], mark: str, *facts: tuple[str, str]) -> Catalogue
     )
 
 
-def _measured(kind: type[Metric], mark: str) -> str:
+def _measured(kind: type[Metric], mark: str, spec: str) -> str:
     """Return when the metric is measured, and its form in a scenario."""
-    name, parameters = f'"{kind.name}"', parameters_of_dataclass(kind)
+    name, parameters = f'"{spec}"', parameters_of_dataclass(kind)
     values = [f"{key.name} = {'…' if key.value is None else json.dumps(key.value)}" for key in parameters]
     table = f"{{ {', '.join([f'metric = {name}', *values])} }}"
     if mark == "standard":
         return "in every run" + (f"; with other parameters where metrics = [{table}] says so" if values else "")
-    plain = f"where a scenario says metrics = [{name}], or [stop] names it"
+    plain = f"where a scenario says metrics = [{name}]" + ("" if ":" in spec else ", or [stop] names it")
     return plain + (f"; with parameters, metrics = [{table}]" if values else "")
 
 

@@ -72,7 +72,8 @@ def _unit(metric: "Metric") -> str:
 
 def _run_rows(result: Result) -> Iterator[tuple[str, str]]:
     arena = result.arenas[0]
-    agents = f"{result.runners} processes, {result.mode}" if result.runners else _agents(result)
+    executors = "processes" if result.facts.runners else "runners that joined"
+    agents = f"{result.runners} {executors}, {result.mode}" if result.runners else _agents(result)
     yield "robots", f"{result.robots}, {agents}" + (f", {len(result.arenas)} arenas" if len(result.arenas) > 1 else "")
     decimals = 2 if result.realtime else 1  # a percent matters in real time
     speed = f"{result.sim_time_s:g} s in {result.wall_time_s:.2f} s: {result.realtime_factor:.{decimals}f} x real time"

@@ -13,6 +13,7 @@ from typing import Any
 
 from swarmwire.comms.base.atomic import write_text
 from swarmwire.comms.base.clock import WallClock
+from swarmwire.comms.base.config import scenario_path
 from swarmwire.comms.base.errors import BadInput, RecordFailed
 from swarmwire.comms.base.printable import LINES, printable
 from swarmwire.comms.observe.interfaces import AgentBackend, TimedBackend
@@ -20,15 +21,21 @@ from swarmwire.deploy.machine import refusal
 from swarmwire.deploy.runs.record.inputs import InputsRecord, RecordedBackend
 from swarmwire.deploy.runs.record.provenance import Copies, RunFacts, copy_scenario
 from swarmwire.deploy.runs.record.replay_logs import LiveEventsLog, LiveEventsRecord
-from swarmwire.metrics.records.run_folder.layout import LOG, SUMMARY, RunLog
+from swarmwire.metrics.records.run_folder.layout import LOG, SCENARIO, SUMMARY, RunLog
 from swarmwire.world.live_events import LiveEvent
 from swarmwire.world.scenario.scenario import Scenario
 
 
-def default_folder(scenario: str, seeds: tuple[int, ...]) -> Path:
+def default_folder(scenario: Path, seeds: tuple[int, ...]) -> Path:
     """Return the default run folder, runs/<scenario>-s<seed>-<UTC>."""
     seed = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]}to{seeds[-1]}"
-    return stamped_folder(Path("runs") / f"{scenario}-s{seed}")
+    return stamped_folder(Path("runs") / f"{short_name(scenario)}-s{seed}")
+
+
+def short_name(scenario: Path) -> str:
+    """Return the name of a scenario for default folders: of its file, or for a `scenario.toml` of its folder."""
+    file = scenario_path(scenario)
+    return file.resolve().parent.name if file.name == SCENARIO else file.stem
 
 
 def stamped_folder(name: Path) -> Path:
