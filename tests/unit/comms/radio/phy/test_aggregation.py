@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.checks import check_radio
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
@@ -122,6 +123,15 @@ def test_packet_to_a_robot_out_of_reach_is_retried_until_its_lifetime_ends():
     ended = [tick for tick, step in enumerate(result.news) if len(step.tx_status)]
     assert ended == [6]  # 0.5 s, then the next access
     assert result.fates() == {"OUT_OF_RANGE": 1}
+
+
+def test_packets_to_a_robot_out_of_reach_do_not_stop_those_to_others():
+    """Each tick has packets to either robot and a broadcast; requests end with the retries of what they ask for."""
+    radio = radio_n({"max_retries": 7})
+    sent = packets([0] * 5, [1, 2, BROADCAST, 1, 2], 100)
+    result = run(make_medium(radio, 3), FAR_THIRD, lambda _: sent, 12, 15)
+    assert result.fates() == {"RECEIVED": 36, "OUT_OF_RANGE": 36}
+    assert result.received("receiver").tolist() == [1] * 36
 
 
 def hidden(access: dict[str, Any]) -> Run:

@@ -24,6 +24,7 @@ from swarmwire.comms.radio.phy.ht.params import (
     RTS_BYTES,
     frame_ns,
 )
+from swarmwire.comms.radio.phy.ht.rate_control import rate_to
 from swarmwire.comms.radio.phy.ht.responses import answered, schedule_response, start_nav_resets
 from swarmwire.comms.radio.phy.ht.state import BLOCK_ACK, BLOCK_ACK_REQUEST, CTS, RTS
 from swarmwire.comms.radio.phy.ht.station import begin, finish, put_on_air
@@ -63,8 +64,9 @@ def send(params, state, events, buffer, r, now_ns):
             return
         robot.packet = state.order[first]
         if station.request_to != NO_ROBOT and _is_any_waiting(state, r, station.request_to):
-            rate = ht.control_rate[station.rate]
             station.to, station.awaits, robot.mac_state = station.request_to, BLOCK_ACK, SENDING
+            station.rate = rate_to(params, state, r, station.to)  # the last PPDU may have been a broadcast
+            rate = ht.control_rate[station.rate]
             duration_ns = params.sifs_ns + frame_ns(ht, rate, BLOCK_ACK_BYTES)
             put_on_air(params, state, events, r, now_ns, BLOCK_ACK_REQUEST, rate, REQUEST_BYTES, duration_ns)
             return
@@ -89,7 +91,9 @@ def send(params, state, events, buffer, r, now_ns):
         if packet.is_in_ppdu:
             remaining -= 1
             packet.attempts += 1
-            packet.on_air_at_ns, packet.airtime_ns, packet.last_fate = now_ns, airtime_ns, RECEIVED
+            # Each packet counts its share, so that their sum is the airtime of the PPDU.
+            packet.on_air_at_ns, packet.airtime_ns = now_ns, airtime_ns // station.count
+            packet.last_fate = RECEIVED
     put_on_air(params, state, events, r, now_ns, DATA, station.rate, station.psdu_bytes, response_ns)
 
 

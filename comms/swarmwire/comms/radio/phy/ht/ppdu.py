@@ -10,7 +10,7 @@ agreement, which is assumed for every pair of robots.
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_FATE, NO_ROBOT, NOWHERE
 from swarmwire.comms.radio.phy import results
-from swarmwire.comms.radio.phy.ht.params import DELIMITER_BYTES, MAX_MPDUS, MAX_PPDU_NS, frame_ns
+from swarmwire.comms.radio.phy.ht.params import DELIMITER_BYTES, MAX_MPDUS, MAX_PPDU_NS, NO_LIMIT, frame_ns
 from swarmwire.comms.radio.phy.ht.rate_control import rate_to
 from swarmwire.comms.robot.packets import Fate, TxResult
 
@@ -105,6 +105,18 @@ def acknowledge(state, s, r, is_block):
 
 
 @kernel()
+def count_request(state, r, to):
+    """Count an unanswered request as an attempt of the packets that wait for its answer; return False without any."""
+    is_any, robot = False, state.robot[r]
+    for k in range(robot.next, robot.enqueue_next):
+        packet = state.packet[state.order[k]]
+        if packet.to == to and packet.attempts > 0 and not (packet.is_done or packet.is_acked):
+            packet.attempts += 1
+            is_any = True
+    return is_any
+
+
+@kernel()
 def pass_on(state, buffer, r, to, now_ns):
     """Record the packets of robot r that their receiver passes on: those received up to the first one that it lacks."""
     robot = state.robot[r]
@@ -168,8 +180,8 @@ def drop_finished(params, state, buffer, r, now_ns):
                     state.ht.station[r].request_to = packet.to
                 if not is_late:
                     state.ht.peer[r, packet.to % params.robots].sinr = 0.0
-        elif packet.attempts == 0:
-            break
+        elif packet.attempts == 0 and params.ht.max_attempts == NO_LIMIT:
+            break  # those behind it are younger
 
 
 @kernel()

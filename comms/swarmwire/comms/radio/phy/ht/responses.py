@@ -73,7 +73,8 @@ def timer_expired(params, state, events, r, now_ns):
         schedule(events, TIMER, r, state.robot[source].on_air_ns + state.robot[source].airtime_ns)
         return
     if station.awaits == BLOCK_ACK:
-        station.request_to = station.to
+        is_repeated = station.count > 0 or ppdu.count_request(state, r, station.to)
+        station.request_to = station.to if is_repeated else NO_ROBOT
     if station.count > 0:
         report_failure(params, state, r, station.to)
         ppdu.dissolve(state, r)
