@@ -103,7 +103,11 @@ def open_executor(name: str, workers: int | None, scenario: Path) -> Executor:
 def tasks_of(
     campaign: Campaign, folder: CampaignWriter, done: Collection[int], batch: int | None, workers: int
 ) -> list[Task]:
-    """Return a task for each batch of runs that are not `done`; each recorded run has a separate task."""
+    """Return a task for each batch of runs that are not `done`; each recorded run has a separate task.
+
+    Tasks are in the order of points; in real time in that of seeds, so that a campaign that ends early has equally many
+    runs of each point.
+    """
     seeds, tasks = len(campaign.seeds), list[Task]()
     size = 1 if campaign.realtime else batch or campaign.batch or default_batch(campaign, workers)
     for point in range(len(campaign.points)):
@@ -112,7 +116,7 @@ def tasks_of(
         batched = [run for run in missing if campaign.seed_of(run) not in campaign.record_seeds]
         tasks += [_task(campaign, folder, point, [run], recorded=True) for run in recorded]
         tasks += [_task(campaign, folder, point, runs, recorded=False) for runs in shares(batched, size)]
-    return tasks
+    return sorted(tasks, key=lambda task: task.runs[0] % seeds) if campaign.realtime else tasks
 
 
 def default_batch(campaign: Campaign, workers: int) -> int:

@@ -86,6 +86,18 @@ def test_missing_runs_are_each_in_one_task_of_their_point(points, seeds, workers
         assert len(task.runs) == 1 or task.record_to is None
 
 
+def test_campaign_in_real_time_goes_seed_by_seed_over_the_points():
+    campaign = made(2, 3, recorded=(2,))
+    campaign.realtime = 1.0
+    assert [(task.seeds, task.point) for task in tasks(campaign, done={1})] == [
+        ((1,), 0),
+        ((1,), 1),
+        ((2,), 1),
+        ((3,), 0),
+        ((3,), 1),
+    ]
+
+
 def test_batches_are_large_and_smaller_where_workers_would_be_idle_or_tasks_long():
     assert default_batch(made(9, 200), 2) == 200
     assert default_batch(made(9, 1000), 2) == 250
