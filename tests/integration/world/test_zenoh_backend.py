@@ -309,6 +309,24 @@ def test_wait_for_robots_without_a_runner_is_announced_once(endpoint: str, monke
     assert announced in ([("flock-0",)], [("flock-1",)])
 
 
+def test_wait_for_an_answer_is_announced_once_with_its_runner(endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for threshold in ("ANNOUNCE_S", "SILENT_S"):
+        monkeypatch.setattr(zenoh_backend, threshold, 0.0)
+    with hosts(endpoint, ["a"]) as started:
+        silent, waiting, checks = list[str](), list[tuple[str, ...]](), itertools.count()
+        hooks = BackendHooks(
+            stopped=lambda: bool(silent) and next(checks) > 3, waiting=waiting.append, silent=silent.append
+        )
+        with closing(backend_of(endpoint, parts("Counter", [0]), "stand", hooks)) as backend:
+            backend.start()
+            child = process_of(started[0])
+            child.suspend()
+            with pytest.raises(Interrupted):
+                act(backend, 0, [0])
+            child.resume()
+    assert (silent, waiting) == (["a, which plays flock-0"], [])
+
+
 def test_runner_that_is_not_ready_in_time_loses_its_robots(endpoint: str) -> None:
     changes: list[RunnerEvent] = []
     free: list[set[str]] = []

@@ -32,7 +32,7 @@ from swarmwire.world.backends.pacing import Pace
 from swarmwire.world.backends.realtime import RealTime
 from swarmwire.world.backends.realtime_backend import PacedBackend, RealTimeBackend, RealTimeReport
 from swarmwire.world.backends.runner_reports import Loss, RunnerEvent, RunnerHealth
-from swarmwire.world.backends.zenoh_backend import BackendHooks, LockstepBackend
+from swarmwire.world.backends.zenoh_backend import SILENT_S, BackendHooks, LockstepBackend
 from swarmwire.world.gateways.backend import GatewayBackend
 from swarmwire.world.subtick import Subticks
 
@@ -182,6 +182,7 @@ def joined_backend(settings: BackendSettings, listening: Listening) -> Generator
         refused=refuse,
         opened=lambda endpoints: observer.opened(endpoints, settings.run_id),
         waiting=wait,
+        silent=lambda runner: log.report(f"no answer for {SILENT_S:g} s from {runner}: the run waits"),
     )
     with closing(_remote_backend(settings, listening.for_agents(settings.run_id), hooks)) as backend:
         backend.open()

@@ -117,6 +117,11 @@ class RunnerRegistry(ABC, Generic[AllocationT]):
         return tuple(sorted(free, key=self._allocations.row_of.__getitem__))
 
     @property
+    def awaited_robots(self) -> tuple[str, ...]:
+        """Names of the robots without a runner for which the loop waits, by row."""
+        return () if self._tick >= 0 and self._on_loss in NON_BLOCKING else self.missing_robots
+
+    @property
     def has_begun(self) -> bool:
         """True once the first tick was opened."""
         return self._tick >= 0

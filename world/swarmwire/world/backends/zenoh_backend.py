@@ -35,6 +35,7 @@ from swarmwire.world.backends.runner_reports import Loss, RunnerEvent, RunnerHea
 
 POLL_S = 0.2  # time between two checks of a wait
 ANNOUNCE_S = 1.0  # a wait for robots without a runner is announced after this time
+SILENT_S = 5.0  # a wait for the answer of a runner is announced after this time
 FREEZE_THRESHOLD_S = 2.0  # a longer time between two checks means that this process was frozen
 START_TIMEOUT_S = 60.0  # time-out of runners that join and build their agents
 LEAVE_TIMEOUT_S = 3.0  # time-out of runners that leave after the end
@@ -57,6 +58,7 @@ class BackendHooks:
         refused: called with the name of a refused runner, and the reason.
         opened: called with the endpoints of an open run.
         waiting: called with the names of the robots without a runner for which the loop has begun to wait.
+        silent: called with a runner, and its robots, for whose answer the loop has waited for SILENT_S.
     """
 
     failure: Callable[[], str | None] = lambda: None
@@ -66,6 +68,7 @@ class BackendHooks:
     refused: Callable[[str, str], None] = lambda _runner, _reason: None
     opened: Callable[[tuple[str, ...]], None] = lambda _: None
     waiting: Callable[[tuple[str, ...]], None] = lambda _: None
+    silent: Callable[[str], None] = lambda _: None
 
 
 NO_HOOKS = BackendHooks()
@@ -103,6 +106,7 @@ class ZenohBackend(ABC, Generic[RegistryT]):
         self._deadline_ns = self._checked_ns = 0
         self._waits_since_ns: int | None = None
         self._announced: tuple[str, ...] = ()  # robots for which the loop waits
+        self._silence_announced = False  # in the present wait
 
     def open(self) -> None:
         """Listen at the endpoints, so that runners may join; BadInput if an endpoint is in use."""
@@ -178,7 +182,7 @@ class ZenohBackend(ABC, Generic[RegistryT]):
         be cold for each sample, since the runners use the cores in between. A query is answered at once.
         """
         self._reset_deadline()
-        self._waits_since_ns, self._announced = self._checked_ns, ()
+        self._waits_since_ns, self._announced, self._silence_announced = self._checked_ns, (), False
         self._wait_for_all()
         self._waits_since_ns = None
 
@@ -209,13 +213,18 @@ class ZenohBackend(ABC, Generic[RegistryT]):
             self._announce_wait()
 
     def _announce_wait(self) -> None:
-        """Call the hook with the robots for which the run waits: once, and again when these change."""
-        missing, since_ns = self._registry.missing_robots, self._waits_since_ns
-        if not self._registry.has_begun or since_ns is None or missing in (self._announced, ()):
+        """Call the hooks with the robots for which the run waits, also when these change, or with a silent runner."""
+        since_ns, missing = self._waits_since_ns, self._registry.awaited_robots
+        if not self._registry.has_begun or since_ns is None:
             return
-        if self._clock.now_ns() - since_ns >= to_ns(ANNOUNCE_S):
+        waits_ns = self._clock.now_ns() - since_ns
+        if missing not in (self._announced, ()) and waits_ns >= to_ns(ANNOUNCE_S):
             self._announced = missing
             self._hooks.waiting(missing)
+        blocking = self._registry.waits_for
+        if blocking and not missing and not self._silence_announced and waits_ns >= to_ns(SILENT_S):
+            self._silence_announced = True
+            self._hooks.silent(blocking)
 
     def _handle_arrived(self) -> None:
         """Handle everything that has arrived, without waiting for more."""
