@@ -10,6 +10,7 @@ import pytest
 from rich.console import Console
 
 from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.sentinels import NO_TICK
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.deploy import Result, run
 from swarmwire.deploy.campaigns.sweep import Sweep
@@ -19,6 +20,7 @@ from swarmwire.deploy.cli.display.sweep import SweepProgress, print_sweep
 from swarmwire.deploy.runs.result import Statistics
 from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.world.backends.realtime_backend import RealTimeReport
+from swarmwire.world.backends.runner_reports import RunnerEvent
 from tests.support.clocks import StillClock
 from tests.support.deploy.runs import LOSSY
 
@@ -112,12 +114,11 @@ def test_real_time_rows_agree_on_requested_and_reached_factor(result):
     assert rows({}) == (speed, "asked for x 1; 2 of 600 ticks missed, worst lag 9.99 s")
 
 
-@pytest.mark.parametrize(
-    ("started", "expected"), [(2, "2 processes, lockstep"), (0, "2 runners that joined, lockstep")]
-)
-def test_robots_row_names_processes_of_the_run_or_runners_that_joined_it(result, started, expected):
-    facts = replace(result.facts, runners=started)
-    assert row(shown(replace(result, runners=2, mode="lockstep", facts=facts)), "robots") == f"20, {expected}"
+def test_robots_row_counts_processes_of_the_run_or_runners_that_joined_it(result):
+    apart = replace(result, runners=2, mode="lockstep")
+    assert row(shown(apart), "robots") == "20, 2 processes, lockstep"
+    joined = tuple(RunnerEvent("joined", name, ("flock-0",), NO_TICK) for name in ("r1", "r2"))
+    assert row(shown(replace(apart, runner_events=joined)), "robots") == "20, 2 runners, lockstep"
 
 
 class Campaign:

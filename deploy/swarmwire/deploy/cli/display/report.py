@@ -72,7 +72,7 @@ def _unit(metric: "Metric") -> str:
 
 def _run_rows(result: Result) -> Iterator[tuple[str, str]]:
     arena = result.arenas[0]
-    executors = "processes" if result.facts.runners else "runners that joined"
+    executors = "runners" if any(event.what == "joined" for event in result.runner_events) else "processes"
     agents = f"{result.runners} {executors}, {result.mode}" if result.runners else _agents(result)
     yield "robots", f"{result.robots}, {agents}" + (f", {len(result.arenas)} arenas" if len(result.arenas) > 1 else "")
     decimals = 2 if result.realtime else 1  # a percent matters in real time
