@@ -29,7 +29,7 @@ STEPS = (
         Step(
             SENDER,
             "medium access",
-            ("none, aloha, cad,", "csma-802154, dcf, esb,", "advertising"),
+            ("none, aloha, cad, esb,", "csma-802154, dcf,", "advertising"),
             ("channel_busy", "duty_cycle"),
             is_phy=True,
         ),
@@ -40,7 +40,13 @@ STEPS = (
     (
         Step(LINK, "fading", ("Rayleigh, Rician,", "Nakagami"), is_phy=True),
         Step(LINK, "events", ("deaths, blackouts,", "partitions"), ("receiver_dead", "blackout", "partitioned")),
-        Step(RECEIVER, "reception", ("SINR, noise,", "capture"), ("too_weak", "collided", "jammed"), is_phy=True),
+        Step(
+            RECEIVER,
+            "reception",
+            ("SINR, noise,", "capture"),
+            ("too_weak", "collided", "jammed", "not_listening"),
+            is_phy=True,
+        ),
         Step(RECEIVER, "losses", ("loss, bursts,", "trace"), ("lost", "burst")),
         Step(RECEIVER, "delays", ("latency_s, jitter_s,", "[radio.delays]"), ("in_flight",)),
         Step(AGENT, "agent", ("radio.received(…)",), ("received",)),
@@ -62,9 +68,9 @@ def draw(to: Path = TO) -> None:
     turn = f"M{last:g} {ROWS_Y[0] + HEIGHT:g} V{between:g} H{first:g} V{ROWS_Y[1] - 1:g}"
     shapes.append(f'<path d="{turn}" stroke="{INK}" fill="none" marker-end="url(#tip)"/>')
     shapes.append(
-        text(LEFT, 360, "Below a box: fates of packets that end there. PHY: a unit disk skips this step.", 12)
+        text(LEFT, 376, "Below a box: fates of packets that end there. PHY: a unit disk skips this step.", 12)
     )
-    to.write_text(page("The radio from sender to receiver", width, 370, shapes), encoding="utf-8")
+    to.write_text(page("The radio from sender to receiver", width, 386, shapes), encoding="utf-8")
 
 
 def _step(x: float, y: float, step: Step) -> list[str]:

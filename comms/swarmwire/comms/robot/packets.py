@@ -38,11 +38,12 @@ class Fate(ExplainedEnum):
     BLACKOUT = 9, "the sender's radio was off, or that of a receiver within reach"
     PARTITIONED = 10, "within reach, but a partition kept the two apart when the packet went on air"
     TOO_WEAK = 11, "within reach on average, but too weak for the receiver's noise when the packet was on air"
-    COLLIDED = 12, "other packets disturbed it, or the receiver was receiving another, sending, or on another channel"
+    COLLIDED = 12, "other packets disturbed it, or the receiver was receiving another or sending"
     BURST = 13, "lost by a burst, while the link was in its bad state"
     CHANNEL_BUSY = 14, "the sender found the medium busy each time it listened: never on air"
     JAMMED = 15, "a jammer disturbed it: without the jammer it would have been received"
     DUTY_CYCLE = 16, "the sender would have exceeded its airtime of an hour: never on air"
+    NOT_LISTENING = 17, "the receiver's scanner was off or on another channel while the packet was on air"
 
 
 FATE_NAMES = tuple(fate.name.lower() for fate in Fate)  # names in summaries and tables, by value

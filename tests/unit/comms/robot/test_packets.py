@@ -131,7 +131,7 @@ def test_received_packets_selected_keep_their_columns_together() -> None:
 def test_fates_have_fixed_numbers() -> None:
     assert " ".join(FATE_NAMES) == (
         "received out_of_range blocked lost queue_full too_large in_flight sender_dead receiver_dead blackout "
-        "partitioned too_weak collided burst channel_busy jammed duty_cycle"
+        "partitioned too_weak collided burst channel_busy jammed duty_cycle not_listening"
     )
     assert [int(fate) for fate in Fate] == list(range(len(FATE_NAMES)))
 

@@ -31,7 +31,7 @@ from swarmwire.comms.robot.packets import Fate
 
 DELAY, SCAN_PHASE = purpose("advertising delay"), purpose("scan phase")
 RECEIVED, BLOCKED = int(Fate.RECEIVED), int(Fate.BLOCKED)
-COLLIDED, JAMMED = int(Fate.COLLIDED), int(Fate.JAMMED)
+COLLIDED, JAMMED, NOT_LISTENING = int(Fate.COLLIDED), int(Fate.JAMMED), int(Fate.NOT_LISTENING)
 RECEIVER_DEAD, BLACKOUT = int(Fate.RECEIVER_DEAD), int(Fate.BLACKOUT)
 BETWEEN_PDUS = 100  # a robot's `on_air` in the gap: it keeps its links, and sends nothing
 FATES = 32  # `pdu_fate` of a link is FATES x number of the PDU + its fate
@@ -99,7 +99,7 @@ def _unlock_if_left(timing, state, channel, r, now_ns):
     rx = state.reception[channel * len(state.robot) + r]
     s = rx.locked_to
     if s >= 0 and _listens_until(timing, r, channel, state.robot[s].on_air_ns) < now_ns:
-        state.link[rx.link].frame_fate = COLLIDED
+        state.link[rx.link].frame_fate = NOT_LISTENING
         reception.unlock(rx)
 
 
@@ -171,8 +171,8 @@ def _pdu_ended(params, timing, losses, state, events, buffer, r, now_ns):
         link = state.link[i]
         before, fate = np.int64(link.pdu_fate), np.int64(link.frame_fate)
         until_ns = _listens_until(timing, np.int64(link.receiver), channel, robot.on_air_ns)
-        if fate == JAMMED and until_ns < now_ns:  # without jammers it would not have been received either
-            fate = COLLIDED
+        if fate in (COLLIDED, JAMMED) and until_ns < now_ns:  # alone, it would not have been received either
+            fate = NOT_LISTENING
         met = until_ns > robot.on_air_ns
         if before == UNDER_WAY or (before % FATES != RECEIVED and met):
             link.pdu_fate = FATES * channel + fate

@@ -70,6 +70,7 @@ FATE_COLORS: dict[Fate, Color] = {
     Fate.CHANNEL_BUSY: (150, 170, 60),
     Fate.JAMMED: (120, 85, 205),
     Fate.DUTY_CYCLE: (95, 140, 120),
+    Fate.NOT_LISTENING: (110, 130, 175),
 }  # out of range has no colour: such receivers are counted, never listed
 
 _SHADE = 0.58  # brightness of an outline relative to its fill

@@ -52,6 +52,7 @@ LINK_FATES = tuple(
         Fate.BURST,
         Fate.PARTITIONED,
         Fate.JAMMED,
+        Fate.NOT_LISTENING,
     )
 )
 MAX_PENDING_ROWS = 250_000  # more rows are added up

@@ -105,6 +105,7 @@ def test_lone_advertiser_is_received_once_by_each_scanner_on_one_of_its_channels
     event_ns = 3 * AIRTIME_NS + 2 * GAP_NS
     delivery = len(rows) / (ticks * (robots - 1))
     assert delivery == pytest.approx(1.0 - event_ns / (3 * INTERVAL_NS) if window_s is None else 0.5, abs=0.03)
+    assert result.fates() == {"RECEIVED": len(rows), "NOT_LISTENING": ticks * (robots - 1) - len(rows)}
     check_fates(result)
 
 
@@ -159,7 +160,7 @@ def test_fates_add_up_while_radios_are_off_and_robots_die():
     pose = np.concatenate([scattered(robots), scattered(robots, 6)])
     result = run_disrupted(make_medium(radio, robots, seeds=(1, 2)), pose, sent, now, 30)
     check_fates(result)
-    assert {"RECEIVED", "COLLIDED", "BLACKOUT"} <= result.fates().keys()
+    assert {"RECEIVED", "COLLIDED", "NOT_LISTENING", "BLACKOUT"} <= result.fates().keys()
 
 
 def test_arenas_do_not_interact():
