@@ -8,11 +8,13 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import polars as pl
 import pytest
 from scipy import stats
 from scipy.sparse.csgraph import connected_components
 
 from swarmwire.comms.protocols.ros2.keys import POSE_STAMPED
+from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.clocks import until
 from tests.support.comms.protocols.ros2.definitions import write_definitions
 from tests.support.deploy.interfaces import (
@@ -135,6 +137,28 @@ def test_tcp_is_slower_where_the_radio_loses(tmp_path):
     clean_bps, lossy_bps = rates_bps
     assert 1e6 < clean_bps < 6e6
     assert 1e4 < lossy_bps < 0.5 * clean_bps
+
+
+@needs_program("iperf3")
+def test_tcp_over_80211n_takes_slower_bit_rates_as_robots_drive_apart(tmp_path, monkeypatch):
+    """65 Mbit/s side by side, at most 39 beyond 48 m: bits of a PPDU over its time on air, headers not counted."""
+    monkeypatch.setenv("IPERF3_S", "7")
+    examples = ROOT / "examples" / "interfaces"
+    files = {name: (examples / name).read_text() for name in ("standing.py", "adaptive.movements")}
+    files["adaptive.movements"] = "0 5 0 2 5 0 9 54 0"
+    scenario = (examples / "adaptive.toml").read_text()
+    with running(tmp_path, scenario, "--set", "duration_s=9", "--packets", "all", files=files) as world:
+        world.process.wait(60.0)
+    packets = RunFolder(world.folder).packets()
+    packets = packets.filter((packets["sender"] == 1) & (packets["fate"] == "received"))
+    ppdus = packets.group_by("on_air_at_ns").agg(
+        pl.col("size_bytes").sum(), pl.col("final_at_ns").max(), pl.col("distance_m").mean()
+    )
+    rates_mbps = 8e3 * ppdus["size_bytes"] / (ppdus["final_at_ns"] - ppdus["on_air_at_ns"])
+    near_mbps = rates_mbps.filter(ppdus["distance_m"] < 10).to_numpy().max()
+    far_mbps = rates_mbps.filter(ppdus["distance_m"] > 48).to_numpy().max()
+    assert 55 < near_mbps < 65
+    assert 10 < far_mbps < 39
 
 
 ROS2_SIMULATOR = """
