@@ -87,6 +87,22 @@ def test_new_project_checks_and_runs_as_it_is(made, tmp_path, monkeypatch, capsy
     assert (tmp_path / "out" / "summary.json").is_file()
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(400)
+def test_new_project_readme_commands_run_as_they_stand_there(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = new_swarm(Path("my_swarm"))[0].parent
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    lines = [line for line in (folder / "README.md").read_text().splitlines() if line.startswith("swarmwire ")]
+    assert len(lines) > 8
+    for line in lines:
+        pipes = {"capture_output": True, "text": True, "timeout": 200}
+        done = subprocess.run(["sh", "-c", line], cwd=folder, env=os.environ | {"PATH": path}, check=False, **pipes)
+        assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+    assert (folder / "loss" / "report.html").is_file()
+    assert (folder / "film.gif").is_file()
+
+
 def test_new_projects_own_test_passes_as_it_is(made):
     ended = own_tests(made)
     assert ended.returncode == 0, ended.stdout
