@@ -21,7 +21,7 @@ def test_kernels_export_without_any_says_what_to_do_first(tmp_path, monkeypatch,
 
 
 @pytest.mark.slow  # a minute of compiling
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1200)
 def test_kernels_of_another_machine_leave_nothing_to_compile(tmp_path):
     def swarmwire(machine: str, *words: str | Path) -> str:
         command = [sys.executable, "-m", "swarmwire.deploy", *map(str, words)]

@@ -28,9 +28,11 @@ NO_EDGES = np.empty((0, 2), np.int64)
 @njit()
 def order_of_delivery(receiver: AnyArray, at_ns: AnyArray, sender: AnyArray, rows: int):
     """Return the rows sorted by (receiver, time, sender), (k,), all below `rows`; stable."""
-    order = np.arange(len(receiver)).astype(np.uint64)
+    order = np.empty(len(receiver), np.uint64)
     if len(order) == 0:
         return order
+    for row in range(len(order)):
+        order[row] = row
     if not _rises(at_ns):
         order = _counting_sort(order, *_time_bins(at_ns))
     # With rows sorted roughly by time, then by receiver, the insertion sort moves almost nothing.

@@ -134,7 +134,9 @@ def smallest_gap_m(
     # On a torus the robots are listed twice: the sweep continues with the first after the last.
     length = 2 * robots if wrap_m[0] > 0.0 else robots
     x, y, radius, robot = np.empty(length), np.empty(length), np.empty(length), np.empty(length, np.int64)
-    largest_m = radius_m.max()
+    largest_m = 0.0
+    for k in range(robots):  # max() of numpy takes a second to compile
+        largest_m = max(largest_m, radius_m[k])
     for arena in range(arenas):
         first, n = arena * robots, 0
         sort_by_x(order[arena], pose[first : first + robots])

@@ -9,7 +9,7 @@ bodies count as one in the count of contacts: a contact begins if a pair touches
 import numpy as np
 
 from swarmwire.comms.base.arrays import AnyArray, BoolArray, IntArray
-from swarmwire.comms.base.kernels import kernel, njit
+from swarmwire.comms.base.kernels import kernel
 from swarmwire.world.engines.discs.records import BEFORE, BOTTOM, CIRCLE, LEFT, NOW, POLYGON, RIGHT, ROBOT
 
 # Contacts are sought within the distance that a robot's speed covers in a step, plus this share of its radius, since
@@ -71,17 +71,14 @@ def _is_before(first, second):
     return first.other < second.other
 
 
-@njit()
 def split_by_contact(moving: BoolArray, contacts: AnyArray) -> tuple[IntArray, IntArray]:
     """Return the `moving` (rows,) rows with a contact in `contacts` (k,) CONTACT_RECORD, and those without; rising.
 
     All rows of the contacts move.
     """
     has_contact = np.zeros(len(moving), np.bool_)
-    for k in range(len(contacts)):
-        has_contact[contacts[k].row] = True
-        if contacts[k].kind == ROBOT:
-            has_contact[contacts[k].other] = True
+    has_contact[contacts["row"]] = True
+    has_contact[contacts["other"][contacts["kind"] == ROBOT]] = True
     return np.flatnonzero(has_contact), np.flatnonzero(moving & ~has_contact)
 
 
