@@ -20,7 +20,7 @@ from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.links import RECEIVED, Links
 from swarmwire.comms.radio.liveness import LivenessHistory
 from swarmwire.comms.radio.model import RadioModel
-from swarmwire.comms.radio.phy import advertising, esb, jamming, mac, tx_queue
+from swarmwire.comms.radio.phy import advertising, esb, jamming, mac, polling, tx_queue
 from swarmwire.comms.radio.phy.duty_cycle import airtime_log
 from swarmwire.comms.radio.phy.event_queue import event_queue
 from swarmwire.comms.radio.phy.graph import RadioGraph
@@ -146,8 +146,8 @@ class SinrPhy(RadioModel):
         self._is_new, self._next_ns, self._buffer = True, 0, result_buffer(MIN_CAPACITY)
         self._spent = airtime_log(rows, context.radio)
         self._switch = tx_queue.switches_of(context.disruption)
-        self._esb_timing = esb.esb_timing(context.radio) if is_esb else None
-        self._polling = esb.new_polling(context.stations, context.robots, len(context.keys)) if is_esb else None
+        self._esb_timing = polling.esb_timing(context.radio) if is_esb else None
+        self._polling = polling.new_polling(context.stations, context.robots, len(context.keys)) if is_esb else None
         self._advertising = self._advertising_timing() if is_advertising else None
         self._pose_id, self._poses = 0, {0: np.zeros((rows, 4))}
         self._now_ns = self._poses_from_ns = self._last_rows = 0
@@ -190,7 +190,7 @@ class SinrPhy(RadioModel):
         self._params = phy_params_of(radio, self._context.robots, self._spreading)
         self._despreading = self._despreading_gains()
         self._frames = frames_of(radio)
-        self._esb_timing = self._esb_timing and esb.esb_timing(radio)
+        self._esb_timing = self._esb_timing and polling.esb_timing(radio)
         self._advertising = self._advertising and self._advertising_timing()
         if not len(self._spent.minute):
             self._spent = airtime_log(len(self._robot), radio)
@@ -279,7 +279,7 @@ class SinrPhy(RadioModel):
         edges = self._graph.edges(pose, alive, self._poses_from_ns)
         if self._spreading is not None:
             edges = edges[self._spreading.are_equal(edges[:, 0], edges[:, 1])]
-        return edges if self._polling is None else edges[esb.are_linked(self._polling, edges[:, 0], edges[:, 1])]
+        return edges if self._polling is None else edges[polling.are_linked(self._polling, edges[:, 0], edges[:, 1])]
 
     def _propagation_params(self) -> PropagationParams:
         now = self._context.disruption

@@ -11,7 +11,7 @@ from swarmwire.comms.base.clock import DatedClock, ScaledClock, to_s
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.comms.radio.phy.esb import new_polling
+from swarmwire.comms.radio.phy.polling import new_polling
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.robot.bodies.body import Body
 from swarmwire.comms.wire.access_control import access_of
