@@ -38,18 +38,18 @@ def reward(state: ArenaState) -> FloatArray:
 def robot_steps(arenas: int) -> tuple[float, float]:
     """Robot-steps a second of processor time with random actions, and neighbours that each robot sees."""
     envs = vector_env(learning(ROBOTS), arenas, reward=reward, hashes=False)
-    seen: Float32Array = envs.reset(seed=1)[0]
+    observations: Float32Array = envs.reset(seed=1)[0]
     envs.action_space.seed(1)
     actions = [envs.action_space.sample() for _ in range(10)]
     for action in actions:
-        seen = envs.step(action)[0]
+        observations = envs.step(action)[0]
     steps, started_s = 0, process_time()
     while (taken_s := process_time() - started_s) < SECONDS:
-        seen = envs.step(actions[steps % len(actions)])[0]
+        observations = envs.step(actions[steps % len(actions)])[0]
         steps += 1
     layout = envs.layouts["flock"]
     present = [index for index, name in enumerate(layout.observation) if name.endswith(" present")]
-    return steps * arenas * ROBOTS / taken_s, float(seen[:, :, present].sum(axis=2).mean())
+    return steps * arenas * ROBOTS / taken_s, float(observations[:, :, present].sum(axis=2).mean())
 
 
 def learn(name: str, repeats: int) -> None:

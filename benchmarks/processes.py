@@ -65,8 +65,8 @@ def processes(name: str, repeats: int, *, robots: int, ticks: int, agent: str) -
     """Real-time factor of a flock with a process per robot; its start, and what each process costs."""
     scenario = scenario_from(scenes.flocking(robots, ticks / 10, agent), name)
     run(scenario.model_copy(update={"duration_s": 1.0}))
-    taken = Consumption(ticks // 3, ticks - 1)
-    results = [run(scenario, runners="per-robot", observers=[taken]) for _ in range(repeats)]
+    consumption = Consumption(ticks // 3, ticks - 1)
+    results = [run(scenario, runners="per-robot", observers=[consumption]) for _ in range(repeats)]
     factors = [result.realtime_factor for result in results]
     config = {
         "agent": agent,
@@ -76,12 +76,14 @@ def processes(name: str, repeats: int, *, robots: int, ticks: int, agent: str) -
         "speed_mps": 0.1,
         "rays": 8,
         "radio": "disk, 2 m, loss 0.3, latency 0.1 s",
-        "runner_us_per_tick": round(taken.runner_us),
-        "world_ms_per_tick": round(taken.world_ms, 1),
-        "host_ms_per_tick": round(taken.host_ms, 1),
+        "runner_us_per_tick": round(consumption.runner_us),
+        "world_ms_per_tick": round(consumption.world_ms, 1),
+        "host_ms_per_tick": round(consumption.host_ms, 1),
     }
     report(name, statistics.median(factors), "x real time", results[0], {**config, **spread(factors)})
     starts = [result.start_time_s for result in results]
     report(f"{name}-start", statistics.median(starts), "s", results[0], {**config, **spread(starts)})
-    report(f"{name}-uss", statistics.median(taken.uss_mb), "MB", results[0], {**config, **spread(taken.uss_mb)})
-    report(f"{name}-memory", taken.all_gb, "GB", results[0], config)
+    report(
+        f"{name}-uss", statistics.median(consumption.uss_mb), "MB", results[0], {**config, **spread(consumption.uss_mb)}
+    )
+    report(f"{name}-memory", consumption.all_gb, "GB", results[0], config)

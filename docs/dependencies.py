@@ -16,10 +16,10 @@ def licences() -> list[tuple[str, str, str]]:
     installs = {"a robot": (f"{OURS}-agent", ""), "everything": (OURS, "")}
     installs |= {f"`[{extra}]`": (OURS, extra) for extra in sorted(extras)}
     rows: dict[tuple[int, str], set[str]] = {}
-    seen: set[str] = set()
+    listed: set[str] = set()
     for column, (root, extra) in enumerate(installs.values()):
-        for name in sorted(_all_needed(root, extra) - seen):
-            seen.add(name)
+        for name in sorted(_all_needed(root, extra) - listed):
+            listed.add(name)
             rows.setdefault((column, licence(name)), set()).add(name)
     installers = list(installs)
     return [
@@ -39,13 +39,13 @@ def licence(name: str) -> str:
 
 def _all_needed(root: str, extra: str) -> set[str]:
     """The distributions of others that an installation brings on this machine."""
-    seen, waiting = set[tuple[str, str]](), [(root, ""), (root, extra)]
+    visited, waiting = set[tuple[str, str]](), [(root, ""), (root, extra)]
     while waiting:
         name, extra_wanted = waiting.pop()
-        if (name, extra_wanted) not in seen:
-            seen.add((name, extra_wanted))
+        if (name, extra_wanted) not in visited:
+            visited.add((name, extra_wanted))
             waiting += _needed(name, extra_wanted)
-    return {name for name, _ in seen if not name.startswith(OURS)}
+    return {name for name, _ in visited if not name.startswith(OURS)}
 
 
 def _needed(name: str, extra: str) -> Iterable[tuple[str, str]]:

@@ -61,7 +61,7 @@ def facts_of(kind: str, title: str) -> str:
 
 def details_of(kind: str) -> str:
     """Each entry of a kind under its name: its text, and the tables of its parameters; each table once."""
-    seen: set[str] = set()
+    visited: set[str] = set()
     parts: list[str] = []
     for entry in entries(kind):
         settings = [_setting(text) for _, text in entry.facts if SETTING.fullmatch(text)]
@@ -69,7 +69,7 @@ def details_of(kind: str) -> str:
             f"### {code(entry.name)}\n",
             *(f"{text}\n" for text in settings),
             f"{text_of(entry)}\n",
-            *_tables(entry, seen),
+            *_tables(entry, visited),
         ]
     return "\n".join(parts)
 
@@ -82,10 +82,10 @@ def event_tables() -> str:
     shared = {"at_s": keys["kill"]["at_s"], "for_s": keys["kill"]["for_s"]}
     without = [code(name) for name, event_keys in keys.items() if "for_s" not in event_keys]
     parts = [key_table(shared.values()), f"{' and '.join(without).capitalize()} have no `for_s`.\n"]
-    seen: set[str] = set()
+    visited: set[str] = set()
     for entry in entries("events"):
         own_keys = [key for key in keys[entry.name].values() if key.name not in (*shared, "do")]
-        parts += [f"### {code(entry.name)}\n", f"{text_of(entry)}\n", *_by_table(own_keys, seen, "")]
+        parts += [f"### {code(entry.name)}\n", f"{text_of(entry)}\n", *_by_table(own_keys, visited, "")]
     return "\n".join(parts)
 
 
@@ -293,12 +293,12 @@ def text_of(entry: CatalogueEntry) -> str:
     return entry.text or sentence(entry.help)
 
 
-def _tables(entry: CatalogueEntry, seen: set[str], prefix: str = "") -> list[str]:
+def _tables(entry: CatalogueEntry, visited: set[str], prefix: str = "") -> list[str]:
     """The tables of an entry's parameters, one for each table of keys, unless `seen` has it already."""
-    return [part for each in entry.tables for part in _by_table(each.parameters, seen, prefix)]
+    return [part for each in entry.tables for part in _by_table(each.parameters, visited, prefix)]
 
 
-def _by_table(parameters: Iterable[CatalogueParameter], seen: set[str], prefix: str) -> Iterator[str]:
+def _by_table(parameters: Iterable[CatalogueParameter], visited: set[str], prefix: str) -> Iterator[str]:
     """The keys without a point, then those of each table within, under its name and its help."""
     rows, held = dict[str, list[CatalogueParameter]](), dict[str, CatalogueParameter]()
     for key in parameters:
@@ -307,9 +307,9 @@ def _by_table(parameters: Iterable[CatalogueParameter], seen: set[str], prefix: 
         held[key.name] = key
     for name, keys in rows.items():
         shown = key_table(keys)
-        if name and shown in seen:
+        if name and shown in visited:
             continue
-        seen.add(shown)
+        visited.add(shown)
         if table_key := held.get(name) or held.get(name.removesuffix(".*")):
             yield f"{code(prefix + name.removesuffix('.*'))}: {table_key.text or sentence(table_key.help)}\n"
         yield shown

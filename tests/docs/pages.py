@@ -43,8 +43,8 @@ class Command:
 
 def blocks_of(page: str, kind: str) -> list[Block]:
     """The page's blocks of one kind."""
-    found = BLOCK.finditer((ROOT / page).read_text(encoding="utf-8"))
-    return [Block(**match.groupdict()) for match in found if match["kind"] == kind]
+    matches = BLOCK.finditer((ROOT / page).read_text(encoding="utf-8"))
+    return [Block(**match.groupdict()) for match in matches if match["kind"] == kind]
 
 
 def files_of(page: str) -> dict[str, str]:

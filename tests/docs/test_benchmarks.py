@@ -47,8 +47,8 @@ def test_benchmark_of_relayed_maps_has_the_loss_to_the_power_of_the_parts():
 def test_packet_is_received_by_positions_at_the_start_of_its_tick(rate_hz: int, arrives: list[bool]):
     """One pair leaves the range half a metre before the packet is sent, another one enters it."""
     start_m, speeds_mps = np.array([49.9, 50.1]), np.array([10.0, -10.0])
-    found = received(Radio(range_m=50.0), start_m, np.full((2, 1), 0.05), speeds_mps, rate_hz)
-    assert found[:, 0].tolist() == arrives
+    packets = received(Radio(range_m=50.0), start_m, np.full((2, 1), 0.05), speeds_mps, rate_hz)
+    assert packets[:, 0].tolist() == arrives
 
 
 def test_disk_radio_has_its_edge_at_its_range():

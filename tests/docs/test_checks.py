@@ -60,8 +60,8 @@ def test_protocol_table_without_a_row_is_a_problem(tmp_path: Path, monkeypatch: 
     before = list(protocol_checks.protocol_page())
     text = protocol_checks.PAGE.read_text(encoding="utf-8")
     before_it, title, table = text.partition("<!-- table: limits -->\n")
-    head, rule, _row, *rest = table.splitlines(keepends=True)
-    (tmp_path / "protocol.md").write_text("".join([before_it, title, head, rule, *rest]))
+    head, rule, _row, *rows = table.splitlines(keepends=True)
+    (tmp_path / "protocol.md").write_text("".join([before_it, title, head, rule, *rows]))
     monkeypatch.setattr(protocol_checks, "PAGE", tmp_path / "protocol.md")
     assert len(list(protocol_checks.protocol_page())) > len(before)
 
@@ -69,10 +69,10 @@ def test_protocol_table_without_a_row_is_a_problem(tmp_path: Path, monkeypatch: 
 def test_problems_are_printed_one_a_line_with_exit_code_1(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
-    for found, code in (((), 0), (("a page: a problem",), 1)):
-        monkeypatch.setattr(checks, "CHECKS", (lambda problems=found: iter(problems),))
+    for expected, code in (((), 0), (("a page: a problem",), 1)):
+        monkeypatch.setattr(checks, "CHECKS", (lambda problems=expected: iter(problems),))
         assert checks.main() == code
-        assert capsys.readouterr().out.splitlines()[:-1] == list(found)
+        assert capsys.readouterr().out.splitlines()[:-1] == list(expected)
 
 
 @pytest.mark.parametrize(
@@ -88,9 +88,9 @@ def test_refused_word_on_a_page_is_a_problem(page: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(prose_checks, "ROOT", page.parents[1])
     monkeypatch.setattr(prose_checks, "PAGES", ["docs/page.md"])
     page.write_text(text)
-    found = list(prose_checks.prose())
-    assert len(found) == problems
-    assert all(problem.startswith("docs/page.md:") and ": expected " in problem for problem in found)
+    refusals = list(prose_checks.prose())
+    assert len(refusals) == problems
+    assert all(problem.startswith("docs/page.md:") and ": expected " in problem for problem in refusals)
 
 
 def test_public_docstrings_and_messages_are_prose_and_private_ones_are_not():

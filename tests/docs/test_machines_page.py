@@ -32,14 +32,14 @@ class Typed:
 
 
 def typed_in(text: str) -> list[Typed]:
-    found: list[Typed] = []
+    commands: list[Typed] = []
     for line in text.splitlines():
-        prompt, dollar, rest = line.partition("$ ")
+        prompt, dollar, command = line.partition("$ ")
         if dollar and prompt in NAMES:
-            found.append(Typed(prompt, rest))
+            commands.append(Typed(prompt, command))
         else:
-            found[-1].shown.append(line)
-    return found
+            commands[-1].shown.append(line)
+    return commands
 
 
 def shell(line: str, folder: Path) -> list[str]:
@@ -62,8 +62,8 @@ def page() -> str:
 def test_machines_page_commands_run_as_shown(page, tmp_path, monkeypatch, capsys):
     with machines(3) as line, ExitStack() as opened:
         on: dict[str, Machine] = dict(zip(NAMES, line, strict=True))
-        with monkeypatch.context() as there:
-            certs = certificates(tmp_path, there, capsys)
+        with monkeypatch.context() as patched:
+            certs = certificates(tmp_path, patched, capsys)
         folders = {name: new_folder(tmp_path / name) for name in NAMES}
         for name, files in table_of(page).items():
             (folders[name] / "certs").mkdir()
@@ -78,12 +78,12 @@ def test_machines_page_commands_run_as_shown(page, tmp_path, monkeypatch, capsys
             started.append(opened.enter_context(Started.running(command)))
             for shown in typed.shown:
                 started[-1].said(*shown.split("…"))
-        by_machine = {typed.machine: of for typed, of in zip(commands, started, strict=True)}
-        assert [of.ended() for of in started if of is not by_machine["gate"]] == [0, 0, 0]
+        by_machine = {typed.machine: process for typed, process in zip(commands, started, strict=True)}
+        assert [process.ended() for process in started if process is not by_machine["gate"]] == [0, 0, 0]
         assert by_machine["laptop"].lines[-1] == "the run is over"
         assert by_machine["gate"].stop() == 0
-    told = json.loads((folders["lab"] / "runs" / "across" / "summary.json").read_text())
-    assert told["trajectory_sha256"] == list(run(LOSSY, overrides=["duration_s=20"]).trajectory_sha256)
+    summary = json.loads((folders["lab"] / "runs" / "across" / "summary.json").read_text())
+    assert summary["trajectory_sha256"] == list(run(LOSSY, overrides=["duration_s=20"]).trajectory_sha256)
 
 
 def certificates(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Path:

@@ -50,13 +50,13 @@ def terminal(line: str) -> Generator[subprocess.Popen[str]]:
             process.communicate()
 
 
-def read_until(process: subprocess.Popen[str], said: str) -> list[str]:
+def read_until(process: subprocess.Popen[str], text: str) -> list[str]:
     """What the process prints, up to the first line with this."""
     assert process.stdout is not None
     lines = list[str]()
     for line in process.stdout:
         lines.append(line)
-        if said in line:
+        if text in line:
             return lines
     raise AssertionError("".join(lines))
 
@@ -137,12 +137,14 @@ def test_pose_feed_beyond_this_machine_needs_certificates_or_insecure():
 def typed() -> list[tuple[str, list[str]]]:
     """All commands of ours in blocks that nothing runs: which program, and its arguments."""
     lines = [line for block in blocks_of(PAGE, "text") for line in block.text.replace("\\\n", " ").splitlines()]
-    found = [OURS.match(line) for line in lines]
-    assert all(found), lines
-    return [(match[1], shlex.split(match[2], comments=True)) for match in found if match]
+    matches = [OURS.match(line) for line in lines]
+    assert all(matches), lines
+    return [(match[1], shlex.split(match[2], comments=True)) for match in matches if match]
 
 
-@pytest.mark.parametrize(("program", "words"), typed(), ids=lambda of: of if isinstance(of, str) else " ".join(of))
+@pytest.mark.parametrize(
+    ("program", "words"), typed(), ids=lambda value: value if isinstance(value, str) else " ".join(value)
+)
 def test_commands_for_robots_are_ones_that_there_are(program: str, words: list[str]):
     if program == "swarmwire-agent":
         parser = agent_parser()

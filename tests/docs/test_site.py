@@ -60,8 +60,8 @@ def page(site: Path, name: str) -> str:
 
 def code(site: Path, name: str) -> set[str]:
     """What a page names as code."""
-    found = re.findall(r"<code[^>]*>(.*?)</code>", page(site, name), re.DOTALL)
-    return {html.unescape(re.sub(r"<[^>]+>", "", item)) for item in found}
+    texts = re.findall(r"<code[^>]*>(.*?)</code>", page(site, name), re.DOTALL)
+    return {html.unescape(re.sub(r"<[^>]+>", "", item)) for item in texts}
 
 
 def described(site: Path, name: str) -> set[str]:
@@ -103,18 +103,21 @@ def test_event_kinds_have_a_section_each(site):
 def test_sensors_page_names_every_sensor_its_fields_and_keys(site):
     named = code(site, "sensors")
     kinds = [getattr(Sensors, name).make_readings for name in SENSOR_SPECS]
-    read = {name for kind in kinds for name in (*dir(kind), *(of.name for of in fields(kind))) if name[0] != "_"}
+    read = {name for kind in kinds for name in (*dir(kind), *(field.name for field in fields(kind))) if name[0] != "_"}
     assert read - {"spec", "vector_sum"} <= named
-    assert {*SENSOR_SPECS, *(f"radio.{of.name}" for of in fields(Measures))} <= named
+    assert {*SENSOR_SPECS, *(f"radio.{field.name}" for field in fields(Measures))} <= named
     assert {f"[sensors.{name}]" for name in SENSOR_SPECS} <= named
-    assert {of.name for kind in SENSOR_SPECS.values() for of in fields(kind)} <= named
+    assert {field.name for kind in SENSOR_SPECS.values() for field in fields(kind)} <= named
 
 
 def test_bodies_page_names_every_body_its_keys_and_sources(site):
     named = code(site, "bodies")
     assert {f'kind = "{name}"' for name in DRIVES} <= named
-    assert {of.name for kind in (Wheels, Twist, Holonomic, Leds, Ros2Names) for of in fields(kind)} <= named
-    assert {"like", *(of.name for of in fields(Body) if of.type in {"str", "float", "bool", str, float, bool})} <= named
+    assert {field.name for kind in (Wheels, Twist, Holonomic, Leds, Ros2Names) for field in fields(kind)} <= named
+    assert {
+        "like",
+        *(field.name for field in fields(Body) if field.type in {"str", "float", "bool", str, float, bool}),
+    } <= named
     assert set(body_names()) <= named
     for name in body_names():
         assert html.escape(load_body(name).source, quote=False) in page(site, "bodies")
@@ -130,7 +133,7 @@ def test_summary_and_metrics_pages_name_every_metric_fate_and_key(site):
     summary = result.summary()
     assert {key for key in summary if key not in {"radio", "metrics"}} <= named
     assert {f"radio.{key}" for key in summary["radio"]} <= named
-    assert all(of.name in page(site, "summary") for of in fields(RealTimeReport))
+    assert all(field.name in page(site, "summary") for field in fields(RealTimeReport))
 
 
 def test_behaviours_have_a_page_that_names_their_parameters(site):
@@ -143,11 +146,11 @@ def test_behaviours_have_a_page_that_names_their_parameters(site):
 
 
 def test_radio_page_names_every_preset_with_its_source(site):
-    told = html.unescape(page(site, "radio-keys"))
+    text = html.unescape(page(site, "radio-keys"))
     assert set(PRESETS) <= code(site, "radio-keys")
     for preset in PRESETS.values():
         # Quotation marks may be typeset.
-        assert all(part in told for part in preset.source.split("'"))
+        assert all(part in text for part in preset.source.split("'"))
 
 
 def commands_within(group: Any, within: str = "") -> Iterator[tuple[str, Any]]:
@@ -164,8 +167,8 @@ def test_command_line_page_names_every_command_and_option(site):
     group: Any = get_command(app)
     for name, command in commands_within(group):
         assert name in named
-        shown = [of for of in command.params if not getattr(of, "hidden", False)]
-        for option in (option for of in shown for option in of.opts if option.startswith("--")):
+        shown = [parameter for parameter in command.params if not getattr(parameter, "hidden", False)]
+        for option in (option for parameter in shown for option in parameter.opts if option.startswith("--")):
             assert any(option in item for item in named), option
     assert "runs/<scenario>-s<seed>-<UTC>" in html.unescape(page(site, "command-line"))  # no tags, no dashes
     assert "Without --realtime" in page(site, "command-line")

@@ -19,8 +19,8 @@ SHOWS_THROUGH = ("PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "UV_PROJECT_ENVIRONM
 
 def bare() -> dict[str, str]:
     """Variables for programs that know nothing of these sources; kernels are not compiled, which would take longer."""
-    kept = {name: value for name, value in os.environ.items() if name not in SHOWS_THROUGH}
-    return {**kept, "NUMBA_DISABLE_JIT": "1", "NO_COLOR": "1", "TERM": "dumb", "COLUMNS": "120"}
+    environment = {name: value for name, value in os.environ.items() if name not in SHOWS_THROUGH}
+    return {**environment, "NUMBA_DISABLE_JIT": "1", "NO_COLOR": "1", "TERM": "dumb", "COLUMNS": "120"}
 
 
 def done(*command: str | Path, cwd: Path) -> str:
@@ -39,12 +39,12 @@ def build(folder: Path) -> None:
 
 def made_once(base: Path, name: str, make: Callable[[Path], object]) -> Path:
     """The folder of that name, filled by the first of the processes that share the tests."""
-    folder, whole = base / name, base / f"{name}.whole"
+    folder, marker = base / name, base / f"{name}.whole"
     with (base / f"{name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not whole.exists():
+        if not marker.exists():
             make(folder)
-            whole.touch()
+            marker.touch()
     return folder
 
 

@@ -38,8 +38,8 @@ def bump(root: Path, version: str, date: str) -> None:
 
 
 def _check(version: str, project: str, changelog: str) -> None:
-    found = OWN.search(project)
-    before = found[1] if found else "none"
+    match = OWN.search(project)
+    before = match[1] if match else "none"
     try:
         if str(Version(version)) != version or Version(version) <= Version(before):
             raise InvalidVersion

@@ -34,8 +34,8 @@ def steps() -> list[tuple[str, list[str]]]:
     """The instructions of the Containerfile with their words; those of RUN are one word."""
     text = re.sub(r"\\\n", " ", (ROOT / "Containerfile").read_text())
     lines = [line.partition(" ") for line in text.splitlines() if line and not line.startswith("#")]
-    readers = {"RUN": lambda rest: [rest], "ENTRYPOINT": json.loads, "CMD": json.loads}
-    return [(name, readers.get(name, shlex.split)(rest)) for name, _, rest in lines]
+    readers = {"RUN": lambda arguments: [arguments], "ENTRYPOINT": json.loads, "CMD": json.loads}
+    return [(name, readers.get(name, shlex.split)(arguments)) for name, _, arguments in lines]
 
 
 class Stage:

@@ -37,8 +37,8 @@ def beside(name: str) -> str:
 
 
 def test_there_are_a_wheel_and_a_source_distribution_of_each(distributions: Path) -> None:
-    found = {path.name for path in distributions.iterdir() if path.suffix in {".whl", ".gz"}}
-    assert found == {
+    names = {path.name for path in distributions.iterdir() if path.suffix in {".whl", ".gz"}}
+    assert names == {
         file for name in NAMES for file in (f"{name}-{VERSION}-py3-none-any.whl", f"{name}-{VERSION}.tar.gz")
     }
 
@@ -51,8 +51,8 @@ def test_wheel_holds_sources_data_and_licence_of_its_part_only(distributions: Pa
     about = {path for path in held if path.startswith(beside(name))}
     assert held - about == sources(name)
     scripts = {f"{beside(name)}/entry_points.txt"}
-    told = {f"{beside(name)}/{file}" for file in ("METADATA", "WHEEL", "RECORD", "licenses/LICENSE")}
-    assert told <= about <= told | scripts
+    files = {f"{beside(name)}/{file}" for file in ("METADATA", "WHEEL", "RECORD", "licenses/LICENSE")}
+    assert files <= about <= files | scripts
     assert licence == (ROOT / "LICENSE").read_bytes()
 
 
@@ -70,22 +70,24 @@ def test_wheel_files_have_the_digests_of_its_record(distributions: Path, name: s
 def test_wheel_metadata_is_valid_and_complete(distributions: Path, name: str) -> None:
     """As an index checks it, and what its page would be empty without."""
     with wheel(distributions, name) as file:
-        told = Metadata.from_email(file.read(f"{beside(name)}/METADATA"), validate=True)
-    assert (told.name, str(told.version)) == (name.replace("_", "-"), VERSION)
-    assert (str(told.license_expression), told.license_files) == ("Apache-2.0", ["LICENSE"])
-    assert str(told.requires_python) == ">=3.11"
-    assert told.summary
-    assert told.description_content_type == "text/markdown"
-    assert told.description
-    assert told.description.lstrip().startswith(f"# {told.name}\n")
-    links = re.findall(r"\]\(([^)]*)\)", told.description)
+        metadata = Metadata.from_email(file.read(f"{beside(name)}/METADATA"), validate=True)
+    assert (metadata.name, str(metadata.version)) == (name.replace("_", "-"), VERSION)
+    assert (str(metadata.license_expression), metadata.license_files) == ("Apache-2.0", ["LICENSE"])
+    assert str(metadata.requires_python) == ">=3.11"
+    assert metadata.summary
+    assert metadata.description_content_type == "text/markdown"
+    assert metadata.description
+    assert metadata.description.lstrip().startswith(f"# {metadata.name}\n")
+    links = re.findall(r"\]\(([^)]*)\)", metadata.description)
     assert all(link.startswith("https://") for link in links), "a page of the index has no files beside it"
-    assert told.author
-    kinds = {of.partition(" :: ")[0] for of in told.classifiers or []}
+    assert metadata.author
+    kinds = {classifier.partition(" :: ")[0] for classifier in metadata.classifiers or []}
     assert {"Intended Audience", "Operating System", "Programming Language", "Typing"} <= kinds
-    assert not any(of.startswith("License") for of in told.classifiers or [])  # PEP 639: license_expression alone
-    ours = [of for of in told.requires_dist or [] if of.name.startswith("swarmwire")]
-    assert {str(of.specifier) for of in ours} <= {f"=={VERSION}"}
+    assert not any(
+        classifier.startswith("License") for classifier in metadata.classifiers or []
+    )  # PEP 639: license_expression alone
+    ours = [requirement for requirement in metadata.requires_dist or [] if requirement.name.startswith("swarmwire")]
+    assert {str(requirement.specifier) for requirement in ours} <= {f"=={VERSION}"}
 
 
 @pytest.mark.parametrize("name", NAMES)

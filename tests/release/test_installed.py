@@ -74,8 +74,8 @@ def test_robot_installation_has_no_heavy_packages_and_runs_agents(robot: Install
     stands_alone(robot)
     assert set(json.loads(robot.python(LISTED))) == ON_ROBOTS
     (robot.cwd / "mine.py").write_text(AGENT)
-    told = robot.run("swarmwire-agent", "check", "mine.py:Mine", "--driver", "epuck2", "--address", "192.0.2.1")
-    assert told.startswith("robot-0: mine.py:Mine on epuck2")
+    output = robot.run("swarmwire-agent", "check", "mine.py:Mine", "--driver", "epuck2", "--address", "192.0.2.1")
+    assert output.startswith("robot-0: mine.py:Mine on epuck2")
 
 
 def test_world_runs_with_a_runner_of_the_robot_installation(everything: Installed, robot: Installed) -> None:

@@ -20,9 +20,9 @@ def project(folder: str) -> dict[str, Any]:
     return tomllib.loads((ROOT / folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
-def requirements(of: dict[str, Any]) -> list[str]:
-    extras = of.get("optional-dependencies", {})
-    return [*of.get("dependencies", []), *(line for lines in extras.values() for line in lines)]
+def requirements(table: dict[str, Any]) -> list[str]:
+    extras = table.get("optional-dependencies", {})
+    return [*table.get("dependencies", []), *(line for lines in extras.values() for line in lines)]
 
 
 def distribution(requirement: str) -> str:
@@ -48,16 +48,16 @@ def test_parts_pin_one_another_exactly(folder: str) -> None:
 
 
 def test_root_distribution_depends_on_all_parts() -> None:
-    brought = {distribution(line) for line in project(".")["dependencies"]}
-    assert brought == {f"swarmwire-{part}" for part in PARTS}
+    dependencies = {distribution(line) for line in project(".")["dependencies"]}
+    assert dependencies == {f"swarmwire-{part}" for part in PARTS}
 
 
 @pytest.mark.parametrize(
-    ("part", "brought"),
+    ("part", "dependencies"),
     [("comms", set()), *((part, {"swarmwire-comms"}) for part in ("agent", "world", "metrics"))],
 )
-def test_part_depends_on_no_other_of_ours_but_comms(part: str, brought: set[str]) -> None:
-    assert {distribution(line) for line in requirements(project(part)) if "swarmwire" in line} == brought
+def test_part_depends_on_no_other_of_ours_but_comms(part: str, dependencies: set[str]) -> None:
+    assert {distribution(line) for line in requirements(project(part)) if "swarmwire" in line} == dependencies
 
 
 def test_namespace_package_has_no_init() -> None:

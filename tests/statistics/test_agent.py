@@ -125,15 +125,15 @@ def order(noise_rad: float, range_m: float, ticks: int = 400, count: int = 100) 
     """The mean order over the second half of a run."""
     options = {"duration_s": ticks, "robots.particles.params.noise_rad": noise_rad, "radio.range_m": range_m}
     options["robots.particles.count"] = count
-    seen: list[float] = []
+    values: list[float] = []
     with Simulation(
         PAPERS / "vicsek.toml", overrides=[f"{key}={value}" for key, value in options.items()]
     ) as simulation:
         for _ in range(ticks):
             simulation.step()
             heading = simulation.world.pose[:, 2]
-            seen.append(float(np.hypot(np.cos(heading).mean(), np.sin(heading).mean())))
-    return float(np.mean(seen[ticks // 2 :]))
+            values.append(float(np.hypot(np.cos(heading).mean(), np.sin(heading).mean())))
+    return float(np.mean(values[ticks // 2 :]))
 
 
 @pytest.mark.parametrize("noise_rad", [1.0, 4.0])

@@ -115,8 +115,8 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
         ("Five robots by thresholds, as above", (*thresholds, *criteria), by_thresholds(runs[CAMPAIGNS[3]])),
         ("Walls and motion, means (95 % interval)", (*moving, "of 3", "of 4 and more"), motion(runs)),
     )
-    taken = cost(pl.concat([runs[name] for name in CAMPAIGNS[:3]], how="diagonal"))
-    return "\n\n".join((*(table(*content) for content in tables), taken))
+    costs = cost(pl.concat([runs[name] for name in CAMPAIGNS[:3]], how="diagonal"))
+    return "\n\n".join((*(table(*content) for content in tables), costs))
 
 
 def quartiles(groups: Mapping[tuple[str, int], pl.DataFrame]) -> list[list[str]]:

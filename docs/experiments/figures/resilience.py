@@ -144,8 +144,8 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
             continue
         share, table = efficiency(runs, reading)
         fits = degradation(share, table)
-        left = [_left(share, table, at) for at in (0.05, 0.5)]
-        lines.append((reading.label, *left, *_fits(fits), _unfinished(runs, reading)))
+        shares = [_left(share, table, at) for at in (0.05, 0.5)]
+        lines.append((reading.label, *shares, *_fits(fits), _unfinished(runs, reading)))
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 

@@ -79,9 +79,9 @@ def test_consensus_decays_by_the_formula_and_losses_bias_it(tmp_path) -> None:
             at = runs.filter(runs["radio.loss"] == loss)
             if range_m is not None:
                 at = at.filter(at["radio.range_m"] == range_m)
-            left, steps = at["first_pattern"].to_numpy(), int(at["steps"][0])
-            error = 3.0 * left.std() / np.sqrt(len(left)) + 1e-6
-            assert left.mean() == pytest.approx(graph.decay(loss) ** steps, abs=error)
+            remaining, steps = at["first_pattern"].to_numpy(), int(at["steps"][0])
+            error = 3.0 * remaining.std() / np.sqrt(len(remaining)) + 1e-6
+            assert remaining.mean() == pytest.approx(graph.decay(loss) ** steps, abs=error)
             assert np.sqrt((at["consensus_bias"].to_numpy() ** 2).mean()) == pytest.approx(
                 graph.after(steps, loss).bias, rel=0.3, abs=1e-6
             )

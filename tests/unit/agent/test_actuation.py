@@ -236,8 +236,8 @@ def test_low_pass_reaches_63_percent_after_its_time_constant(period_s: float) ->
 
 
 def test_hysteresis_switches_on_above_off_below_and_stays_in_between() -> None:
-    on, seen = np.array([False]), list[bool]()
+    on, states = np.array([False]), list[bool]()
     for value in (0.5, 0.9, 1.0, 0.5, 0.3, np.nan, 0.2, 0.5, np.nan):
         on = hysteresis(on, np.array([value]), rises_to=1.0, falls_to=0.2)
-        seen.append(bool(on[0]))
-    assert seen == [False, False, True, True, True, True, False, False, False]
+        states.append(bool(on[0]))
+    assert states == [False, False, True, True, True, True, False, False, False]

@@ -71,18 +71,18 @@ def test_reading_without_a_field_names_its_fields() -> None:
 
 
 def test_declared_sensors_return_the_robots_own_readings() -> None:
-    seen: list[tuple[float, ...]] = []
+    results: list[tuple[float, ...]] = []
 
     def read(robot: Robot) -> None:
         ray = float(robot.proximity.value[3])
-        seen.append((ray, robot.compass.heading_rad, robot.odometry.left_m, robot.odometry.right_m))
+        results.append((ray, robot.compass.heading_rad, robot.odometry.left_m, robot.odometry.right_m))
         assert robot.proximity.angle_rad.shape == robot.proximity.distance_m.shape == (8,)
         assert (robot.time_s, robot.period_s, robot.body.name) == (0.4, 0.1, "epuck")
 
     once(agent_doing(read, *READS), [2, 5], tick=4)
     fields = readings(4, [2, 5]).fields
     columns = (fields["proximity.value"][:, 3], *(fields[n] for n in list(fields)[1:]))
-    assert seen == list(zip(*(column.tolist() for column in columns), strict=True))
+    assert results == list(zip(*(column.tolist() for column in columns), strict=True))
 
 
 @pytest.mark.parametrize(("name", "need"), [("range_m", "range"), ("bearing_rad", "bearing"), ("rssi_dbm", "rssi")])
@@ -96,11 +96,11 @@ def test_radio_measurements_must_be_declared(name: str, need: str) -> None:
 
 
 def test_packets_have_sender_sequence_time_range_and_bearing() -> None:
-    seen: list[list[tuple[float, ...]]] = []
+    results: list[list[tuple[float, ...]]] = []
 
     def read(robot: Robot) -> None:
         packets = robot.radio.received(Word)
-        seen.append([(p.message.number, p.sender, p.sequence, p.received_at_ns, p.range_m) for p in packets])
+        results.append([(p.message.number, p.sender, p.sequence, p.received_at_ns, p.range_m) for p in packets])
         assert all(-1.0 <= p.bearing_rad <= 1.0 for p in packets)
 
     received = received_from(words(0, 2, 7), [2, 3, 5])  # robot 3 belongs to another group
@@ -108,8 +108,8 @@ def test_packets_have_sender_sequence_time_range_and_bearing() -> None:
     sender, range_m = received.sender_index, received.measured["range_m"]
     columns = sender.astype(float), sender, received.sequence, received.received_at_ns, range_m
     rows = list(zip(received.receiver.tolist(), *(column.tolist() for column in columns), strict=True))
-    assert seen == [[row[1:] for row in rows if row[0] == receiver] for receiver in (2, 5)]
-    assert [len(packets) for packets in seen] == [2, 3]
+    assert results == [[row[1:] for row in rows if row[0] == receiver] for receiver in (2, 5)]
+    assert [len(packets) for packets in results] == [2, 3]
 
 
 def test_message_of_another_class_or_length_is_not_received() -> None:

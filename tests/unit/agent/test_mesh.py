@@ -46,9 +46,9 @@ class Air:
     def note(self, *, value: float) -> None:
         self.value = value
 
-    def step(self, agent: Any, time_s: float, *heard: tuple[Text, float]) -> list[Text]:
+    def step(self, agent: Any, time_s: float, *texts: tuple[Text, float]) -> list[Text]:
         self.time_s, self.radio.sent = time_s, []
-        self.radio.heard = [SimpleNamespace(message=text, rssi_dbm=rssi_dbm) for text, rssi_dbm in heard]
+        self.radio.heard = [SimpleNamespace(message=text, rssi_dbm=rssi_dbm) for text, rssi_dbm in texts]
         agent.step(self)
         return self.radio.sent
 

@@ -63,9 +63,9 @@ def test_run_with_a_policy_equals_the_episode_of_its_network(policy: Path) -> No
         run.run()
     envs = vector_env(SCENARIO, arenas=1, seed=3, neighbours=FLOCKING.neighbours, overrides=SHORT)
     trained = PolicyNetwork(policy.read_bytes(), "here")
-    seen, _ = envs.reset()
+    observations, _ = envs.reset()
     for _ in range(20):
-        seen, *_ = envs.step(trained(seen[0])[None])
+        observations, *_ = envs.step(trained(observations[0])[None])
     assert list(envs.trajectory_sha256) == run.hashes()
 
 

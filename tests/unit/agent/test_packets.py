@@ -88,17 +88,17 @@ def test_tx_status_has_the_id_that_send_returned(keeps: type[Keeps]):
 
 
 def test_tx_status_of_a_vector_agent_is_in_columns():
-    seen: list[TxStatuses] = []
+    statuses: list[TxStatuses] = []
 
     def read(robots: Robots) -> None:
-        seen.append(robots.radio.tx_status)
+        statuses.append(robots.radio.tx_status)
         robots.radio.send(Other, to=np.arange(robots.n) + 1, number=1.0)
 
     agents = agents_for(vector_agent_doing(read, "radio.tx_status"), [2, 5, 8])
     assert step(agents, 0, [2, 5, 8]).sent.tx_status_ids.tolist() == [0, 0, 0]
     step(agents, 1, [2, 5, 8], tx_statuses=tx_status((5, 0, 2), (8, 0, 0)))
-    assert (seen[1].row.tolist(), seen[1].id.tolist(), seen[1].result.tolist()) == ([1, 2], [0, 0], [2, 0])
-    assert seen[1].acknowledged.tolist() == [False, True]
+    assert (statuses[1].row.tolist(), statuses[1].id.tolist(), statuses[1].result.tolist()) == ([1, 2], [0, 0], [2, 0])
+    assert statuses[1].acknowledged.tolist() == [False, True]
 
 
 def test_tx_status_without_a_declaration_is_neither_requested_nor_readable():

@@ -51,8 +51,10 @@ def outcome(messages: list[bytes]) -> Outcome:
             server.processes[HOSTILE].send(data)
         events = [event for _ in messages for event in processes.events(0)]
         lost = [event for event in events if isinstance(event, Lost)]
-        gone = [loss.process for loss in lost]
-        answers = [event for event in events if isinstance(event, ProcessAnswer) and event.process not in gone]
+        lost_processes = [loss.process for loss in lost]
+        answers = [
+            event for event in events if isinstance(event, ProcessAnswer) and event.process not in lost_processes
+        ]
         actions, _, more = processes.read(answers)
         return Outcome([*lost, *more], actions)
 

@@ -120,19 +120,19 @@ def test_people_are_told_once_of_a_packet_that_is_too_large(agent, capfd):
     result = run(LOSSY, overrides=[*agent("Rambles"), "radio.max_payload_bytes=9"])
     assert result.radio is not None
     assert result.radio.fates["too_large"] > 19
-    told = [line for line in capfd.readouterr().err.splitlines() if "too_large" in line]
-    assert len(told) == 1
-    assert "10 bytes" in told[0]
-    assert "radio.max_payload_bytes" in told[0]
+    lines = [line for line in capfd.readouterr().err.splitlines() if "too_large" in line]
+    assert len(lines) == 1
+    assert "10 bytes" in lines[0]
+    assert "radio.max_payload_bytes" in lines[0]
 
 
 def test_battery_that_ends_is_reported_with_robots_and_time(capfd):
     battery = "{ battery = { capacity_wh = 1.0, idle_w = 3600.0, start = 0.5 } }"  # half a second
     one = ["robots.flock.count=2", f"robots.flock.body_overrides.sensors={battery}"]
     result = run(LOSSY, overrides=["duration_s=1.0", *one])
-    told = [line for line in capfd.readouterr().err.splitlines() if "battery" in line]
-    assert len(told) == 1
-    assert all(word in told[0] for word in ("flock-0", "flock-1", "0.5 s"))
+    lines = [line for line in capfd.readouterr().err.splitlines() if "battery" in line]
+    assert len(lines) == 1
+    assert all(word in lines[0] for word in ("flock-0", "flock-1", "0.5 s"))
     assert [(event["do"], event["at_s"]) for event in result.summary()["events"]] == [("run_down", 0.5)]
 
 
@@ -154,8 +154,10 @@ def played(monkeypatch, tmp_path):
 
                 patched.setattr(backends, "LocalBackend", made)
             result = run(LOSSY, overrides=overrides, observers=[watcher])
-        told = [f"{change.what} {change.runner} {change.tick}" for of in backend for change in of.roster.events]
-        return result, watcher, told
+        changes = [
+            f"{change.what} {change.runner} {change.tick}" for joiners in backend for change in joiners.roster.events
+        ]
+        return result, watcher, changes
 
     return play
 
@@ -178,11 +180,11 @@ SAME = {
 }
 
 
-@pytest.mark.parametrize(("script", "told"), SAME.values(), ids=SAME)
-def test_run_that_waits_for_its_runners_is_the_same_bit_for_bit(played, script, told):
+@pytest.mark.parametrize(("script", "last_changes"), SAME.values(), ids=SAME)
+def test_run_that_waits_for_its_runners_is_the_same_bit_for_bit(played, script, last_changes):
     """Agents' memory comes back with their robots."""
     result, _, changes = played("wait", script)
-    assert ", ".join(changes).endswith(told)
+    assert ", ".join(changes).endswith(last_changes)
     assert result.trajectory_sha256 == played()[0].trajectory_sha256
     assert not any(name.endswith("_frames") for name in result.counts)
 
@@ -210,8 +212,8 @@ def test_robots_without_an_agent_stand_or_coast_as_the_run_goes_on(played, on_lo
     result, watcher, _ = played(on_loss, script)
     assert result.ticks == 15
     assert moves(watcher.truths) == expected[on_loss]
-    told = {name: count for name, count in result.counts.items() if name.startswith("runners_")}
-    assert told == counts
+    runner_counts = {name: count for name, count in result.counts.items() if name.startswith("runners_")}
+    assert runner_counts == counts
     assert ("packets_without_agent" in result.counts) == bool(counts)
 
 

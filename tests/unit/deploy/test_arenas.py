@@ -76,19 +76,19 @@ def without_a_wall(picture: str) -> str:
     ],
 )
 def test_run_with_files_is_repeated_from_its_folder_alone(tmp_path: Path, scenario, files, overrides, change):
-    there, folder = tmp_path / "there", tmp_path / "run"
-    there.mkdir()
-    shutil.copy(scenario, there)
+    source, folder = tmp_path / "there", tmp_path / "run"
+    source.mkdir()
+    shutil.copy(scenario, source)
     first, *_ = files.values()
     original = (scenario.parent / first).read_bytes()
     for name in files.values():
-        (there / name).write_bytes(original)
-    result = run(there / scenario.name, overrides=overrides, seeds=[3, 4], out=folder)
-    shutil.rmtree(there)
+        (source / name).write_bytes(original)
+    result = run(source / scenario.name, overrides=overrides, seeds=[3, 4], out=folder)
+    shutil.rmtree(source)
     copies = {copied["what"]: copied for copied in json.loads((folder / "run.json").read_text())["files"]}
     digest = hashlib.sha256(original).hexdigest()
-    for what, name in files.items():
-        assert copies[what] == {"path": f"files/{name}", "sha256": digest, "what": what}
+    for key, name in files.items():
+        assert copies[key] == {"path": f"files/{name}", "sha256": digest, "what": key}
     moved = folder.rename(tmp_path / "moved")
     repetition = repeat(moved)
     assert (repetition.same, repetition.changes) == (True, ())
@@ -218,10 +218,10 @@ def test_csv_and_parquet_are_read_by_name(tmp_path):
         assert traces.delay_s is None
         trace = traces.delivery_ratio
         assert trace is not None
-        found = trace.values_at(
+        values = trace.values_at(
             np.array([2, 2, 0]), np.array([0, 0, 2]), np.array([499_999_999, 500_000_000, 500_000_000])
         )
-        assert found == pytest.approx([0.25, 1.0, np.nan], nan_ok=True)
+        assert values == pytest.approx([0.25, 1.0, np.nan], nan_ok=True)
 
 
 def test_link_traces_have_the_values_of_their_rows_per_quantity(tmp_path):

@@ -216,7 +216,7 @@ OF_COMMANDS = [
 
 
 @pytest.fixture
-def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
+def error_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     """What a command prints that fails with exit code 2, in a folder with a CA."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
@@ -231,15 +231,15 @@ def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
 
 
 @pytest.mark.parametrize(("setting", "line"), OF_SETTINGS)
-def test_bad_setting_is_refused_with_option_key_and_expectation(said, setting, line):
-    assert said("check", str(LOSSY), "--set", setting) == f"error: --set {setting}: {line}\n"
+def test_bad_setting_is_refused_with_option_key_and_expectation(error_of, setting, line):
+    assert error_of("check", str(LOSSY), "--set", setting) == f"error: --set {setting}: {line}\n"
 
 
 @pytest.mark.parametrize(("setting", "line"), OF_FILES)
-def test_scenario_that_does_not_fit_a_setting_is_refused_by_its_file(said, setting, line):
-    assert said("check", str(LOSSY), "--set", setting) == f"error: {LOSSY}: {line}\n"
+def test_scenario_that_does_not_fit_a_setting_is_refused_by_its_file(error_of, setting, line):
+    assert error_of("check", str(LOSSY), "--set", setting) == f"error: {LOSSY}: {line}\n"
 
 
 @pytest.mark.parametrize(("words", "line"), OF_COMMANDS)
-def test_wrong_command_is_refused_with_what_to_type_instead(said, words, line):
-    assert said(*words.split()) == f"error: {line}\n"
+def test_wrong_command_is_refused_with_what_to_type_instead(error_of, words, line):
+    assert error_of(*words.split()) == f"error: {line}\n"

@@ -81,12 +81,12 @@ def lines_of(kind: Any) -> list[tuple[str, ...]]:
     kind = written_form(kind)
     hints = get_type_hints(kind)
     wanted: list[tuple[str, ...]] = []
-    for of in fields(kind):
-        limits = bounds_of(of)
-        inner = [hint for hint in (hints[of.name], *get_args(hints[of.name])) if is_dataclass(hint)]
-        default = "" if of.default in (MISSING, None) or inner else json.dumps(of.default)
-        wanted.append((of.name, limits.help, limits.unit, default, *limits.choices))
-        wanted += [(f"{of.name}.{name}", *rest) for hint in inner for name, *rest in lines_of(hint)]
+    for field in fields(kind):
+        limits = bounds_of(field)
+        inner = [hint for hint in (hints[field.name], *get_args(hints[field.name])) if is_dataclass(hint)]
+        default = "" if field.default in (MISSING, None) or inner else json.dumps(field.default)
+        wanted.append((field.name, limits.help, limits.unit, default, *limits.choices))
+        wanted += [(f"{field.name}.{name}", *cells) for hint in inner for name, *cells in lines_of(hint)]
     return wanted
 
 
@@ -122,10 +122,16 @@ def test_entry_is_found_by_name_and_printed_with_every_parameter(kind):
         text, narrow = printed(entry), printed(entry, width=80)
         assert entry.help in text
         assert max(map(len, narrow.splitlines())) <= 80
-        for of in (of for table in entry.tables for of in table.parameters):
-            value = "required" if of.required else "" if of.value is None else json.dumps(of.value, ensure_ascii=False)
-            assert_tells(text, [(of.name, value, of.unit, of.help)])
-            assert f"\n{of.name} " in narrow
+        for parameter in (parameter for table in entry.tables for parameter in table.parameters):
+            value = (
+                "required"
+                if parameter.required
+                else ""
+                if parameter.value is None
+                else json.dumps(parameter.value, ensure_ascii=False)
+            )
+            assert_tells(text, [(parameter.name, value, parameter.unit, parameter.help)])
+            assert f"\n{parameter.name} " in narrow
 
 
 @pytest.mark.parametrize("name", CLASSES)
@@ -137,9 +143,9 @@ def test_entry_of_a_class_describes_each_of_its_fields(name):
 def test_behaviour_entry_shows_needs_and_parameters(name):
     kind, text = getattr(behaviours, name), printed(find(name))
     assert ", ".join(kind.needs) in text
-    for of in parameters_of(kind).values():
-        default = "required" if of.default is REQUIRED else json.dumps(of.default)
-        assert_tells(text, [(of.name, default, unit_of(of.name))])
+    for parameter in parameters_of(kind).values():
+        default = "required" if parameter.default is REQUIRED else json.dumps(parameter.default)
+        assert_tells(text, [(parameter.name, default, unit_of(parameter.name))])
     assert find(f"swarmwire.agent.behaviours:{name}") == find(name)
 
 
@@ -151,8 +157,8 @@ def test_body_entry_shows_the_figures_of_its_sheet(name):
         ("drive", body.drive),
         *((f"sensor: {sensor}", body.sensors[sensor]) for sensor in body.sensors),
     ]:
-        plain = [of for of in fields(sheet) if not is_dataclass(getattr(sheet, of.name))]
-        figures = [(of.name, bounds_of(of).unit, json.dumps(getattr(sheet, of.name))) for of in plain]
+        plain = [field for field in fields(sheet) if not is_dataclass(getattr(sheet, field.name))]
+        figures = [(field.name, bounds_of(field).unit, json.dumps(getattr(sheet, field.name))) for field in plain]
         assert_tells(text[text.index(f"\n{title}\n") :], figures)
 
 
@@ -163,9 +169,9 @@ def test_metrics_and_stages_tell_what_their_code_says():
         assert facts["bounds"]
     for kind in ORDER:
         entry = find(f"stage:{kind.name}")
-        told = {of.name for table in entry.tables for of in table.parameters}
-        assert {f"radio.{key}" for key in kind.keys} <= told
-        assert bool(told) == bool(kind.keys)
+        names = {parameter.name for table in entry.tables for parameter in table.parameters}
+        assert {f"radio.{key}" for key in kind.keys} <= names
+        assert bool(names) == bool(kind.keys)
 
 
 def test_schema_keys_of_a_scenario_can_all_be_described():
@@ -177,7 +183,7 @@ def test_schema_keys_of_a_scenario_can_all_be_described():
 
 
 @pytest.mark.parametrize(
-    ("name", "place"),
+    ("name", "path"),
     [
         ("seed", "seed, before the first table"),
         ("radio", "the table [radio]"),
@@ -187,12 +193,12 @@ def test_schema_keys_of_a_scenario_can_all_be_described():
         ("events.*.robots.share", "share in [events.robots]"),
     ],
 )
-def test_key_entry_shows_its_place_in_a_scenario_file(name, place):
-    assert dict(find(name).facts)["in a scenario"] == place
+def test_key_entry_shows_its_place_in_a_scenario_file(name, path):
+    assert dict(find(name).facts)["in a scenario"] == path
 
 
 @pytest.mark.parametrize(
-    ("asked", "name"),
+    ("query", "name"),
     [
         ("ORDER", "order"),
         ("loss", "radio.loss"),
@@ -202,12 +208,12 @@ def test_key_entry_shows_its_place_in_a_scenario_file(name, place):
         ("events:kill", "kill"),
     ],
 )
-def test_entry_is_found_by_a_short_name_or_the_users_group_name(asked, name):
-    assert find(asked).name == name
+def test_entry_is_found_by_a_short_name_or_the_users_group_name(query, name):
+    assert find(query).name == name
 
 
 @pytest.mark.parametrize(
-    ("asked", "expected"),
+    ("query", "expected"),
     [
         ("flokking", "Flocking"),
         ("radio.los", "radio.loss"),
@@ -223,17 +229,19 @@ def test_entry_is_found_by_a_short_name_or_the_users_group_name(asked, name):
         ("swarmwire.agent:Robot", "Agent or VectorAgent"),
     ],
 )
-def test_unknown_or_ambiguous_name_is_refused_with_what_to_try(asked, expected):
-    with refused_input(asked, match=re.escape(expected)):
-        find(asked)
+def test_unknown_or_ambiguous_name_is_refused_with_what_to_try(query, expected):
+    with refused_input(query, match=re.escape(expected)):
+        find(query)
 
 
 def test_bodies_and_agents_of_a_user_are_described_as_shipped_ones(tmp_path, monkeypatch):
     (tmp_path / "mine.toml").write_text('like = "epuck"\nmass_kg = 0.7\n[sensors.proximity]\nnoise = 0.25\n')
     (tmp_path / "my_agent.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
-    of = [[value for table in find(name).tables for value in table.parameters] for name in ("mine.toml", "body:epuck")]
-    changed = [(now.name, now.value) for now, was in zip(*of, strict=True) if repr(now) != repr(was)]
+    parameters = [
+        [value for table in find(name).tables for value in table.parameters] for name in ("mine.toml", "body:epuck")
+    ]
+    changed = [(now.name, now.value) for now, was in zip(*parameters, strict=True) if repr(now) != repr(was)]
     assert changed == [("mass_kg", 0.7), ("noise", 0.25)]
     text = printed(find("my_agent.py:Mine"))
     assert "Turns on the spot.\n\nFor ever." in text
@@ -260,9 +268,9 @@ def test_metrics_of_packages_are_listed_and_described_also_if_they_do_not_import
     kinds = called(monkeypatch, capsys, "list")[1]
     assert all(f"{kind.name} " in kinds for kind in KINDS)
     lines = called(monkeypatch, capsys, "list", "metrics")[1].splitlines()
-    told = {line.split()[0]: line for line in lines}
-    assert "plug-in" in told["east"]
-    assert "ValueError: fog" in told["west"]
+    lines_by_name = {line.split()[0]: line for line in lines}
+    assert "plug-in" in lines_by_name["east"]
+    assert "ValueError: fog" in lines_by_name["west"]
     text = called(monkeypatch, capsys, "describe", "east")[1]
     assert all(part in text for part in ('metric = "east"', "from_m = 0.0", "sky_metrics:East", "at least -9"))
     assert called(monkeypatch, capsys, "describe", "west")[0] == 0

@@ -288,6 +288,6 @@ def test_hang_up_before_the_first_tick_has_exit_code_129():
     with pytest.raises(Interrupted), leaving_when_hung_up(interrupt):
         raise Interrupted("interrupted while it waited for its runners")
     interrupt.hung_up = True
-    with pytest.raises(typer.Exit) as left, leaving_when_hung_up(interrupt):
+    with pytest.raises(typer.Exit) as ended, leaving_when_hung_up(interrupt):
         raise Interrupted("interrupted while it waited for its runners")
-    assert left.value.exit_code == 129
+    assert ended.value.exit_code == 129

@@ -33,12 +33,12 @@ def test_summary_lists_events_with_tick_and_robots(local, tmp_path):
         (27, "revive", False),
     ]
     run(DISRUPTED, overrides=DISRUPTED_SHORT, out=tmp_path / "run")
-    told = json.loads((tmp_path / "run" / "summary.json").read_text())["events"]
+    events = json.loads((tmp_path / "run" / "summary.json").read_text())["events"]
     killed = local.events[1].robots[0]
     expected = {"at_s": 0.6, "tick": 6, "do": "kill", "part": "", "ended": False, "singly": False, "robots": killed}
-    assert told[1] == expected
+    assert events[1] == expected
     assert len(killed) == 4
-    assert [len(event["robots"]) for event in told if event["do"] == "partition"] == [20, 20]
+    assert [len(event["robots"]) for event in events if event["do"] == "partition"] == [20, 20]
 
 
 def test_fates_add_up_and_each_disruption_has_its_own(local):
@@ -126,16 +126,16 @@ def first_held(order, ticks):
 
 def test_arena_ends_when_its_metric_has_held_and_others_go_on(tmp_path, stopping):
     result = run(stopping, seeds=SEEDS, out=tmp_path / "run")
-    whole = run(stopping, seeds=SEEDS, overrides=["stop=[]"], out=tmp_path / "whole")
-    assert {arena.ended for arena in whole.arenas} == {"duration"}
-    assert [arena.stop_time_s for arena in whole.arenas] == [None] * len(SEEDS)
+    complete = run(stopping, seeds=SEEDS, overrides=["stop=[]"], out=tmp_path / "whole")
+    assert {arena.ended for arena in complete.arenas} == {"duration"}
+    assert [arena.stop_time_s for arena in complete.arenas] == [None] * len(SEEDS)
     assert {arena.ended for arena in result.arenas} == {"stopped", "duration"}
     for number, arena in enumerate(result.arenas):
         order = RunFolder(tmp_path / "whole").metrics(number)["order"].to_numpy()
         start = first_held(order, 6)
         if start is None:
             assert (arena.ended, arena.stop_time_s, arena.stopped_by, arena.ticks) == ("duration", None, None, 40)
-            assert arena == whole.arenas[number]
+            assert arena == complete.arenas[number]
         else:
             assert arena.ended == "stopped"
             assert arena.stop_time_s == pytest.approx(start / 10)
@@ -166,7 +166,7 @@ def test_rows_of_a_campaign_say_when_and_by_what_each_run_stopped(stopping):
         assert row["aggregation_time_s"] == arena.metrics["aggregation_time_s"].final
     by_column = {response.column: response.kind for response in responses_of([load_scenario(stopping, [listed])])}
     assert by_column["stop_time_s"] == by_column["aggregation_time_s"] == "time"
-    assert "stop_time_s" not in {of.column for of in responses_of([load_scenario(stopping, ["stop=[]"])])}
+    assert "stop_time_s" not in {response.column for response in responses_of([load_scenario(stopping, ["stop=[]"])])}
 
 
 def test_run_ends_when_all_arenas_have_stopped_and_is_repeatable(tmp_path, stopping):

@@ -19,9 +19,9 @@ from tests.support.world.gateways import ScriptedGateway
 
 
 def read(*texts: str, options: tuple[str, ...] = ()) -> Gateways:
-    found = parse_gateways(texts, options, None, None)
-    assert found is not None
-    return found
+    gateways = parse_gateways(texts, options, None, None)
+    assert gateways is not None
+    return gateways
 
 
 def refused(call: Any) -> BadInput:
@@ -89,23 +89,23 @@ def test_revoked_names_are_those_given_and_those_of_the_authority(tmp_path) -> N
         assert network is not None
         assert network.certificate == folder / "tracker.pem"
         assert network.revoked == ("flock-1", *named)
-        whole = as_gateways(Gateways({"": "epuck2"}, network=replace(network, revoked=named)))
-        assert whole is not None
-        assert whole.network == replace(network, revoked=(*named, "flock-1"))
+        gateways = as_gateways(Gateways({"": "epuck2"}, network=replace(network, revoked=named)))
+        assert gateways is not None
+        assert gateways.network == replace(network, revoked=(*named, "flock-1"))
     (folder / "certs.json").unlink()  # somebody else's CA
     network = gateway_network("tls/127.0.0.1:0", folder, ("flock-0",), insecure=False)
     assert network is not None
     assert network.revoked == ("flock-0",)
-    given = Gateways({"": "epuck2"}, network=network)
-    assert as_gateways(given) is given
+    unchanged = Gateways({"": "epuck2"}, network=network)
+    assert as_gateways(unchanged) is unchanged
     assert refused(lambda: gateway_network(None, None, ["flock-0"], insecure=False)).where == "--revoked"
 
 
 def test_python_takes_one_text_a_table_or_all_of_it() -> None:
-    whole = Gateways({"a": "ros2"})
+    gateways = Gateways({"a": "ros2"})
     assert as_gateways("epuck2") == Gateways({"": "epuck2"})
-    assert as_gateways({"a": "ros2"}) == whole
-    assert as_gateways(whole) is whole
+    assert as_gateways({"a": "ros2"}) == gateways
+    assert as_gateways(gateways) is gateways
     assert as_gateways(None) is None
 
 
@@ -156,8 +156,8 @@ def test_folder_is_not_made_if_a_gateway_is_refused(two_groups, scripted, tmp_pa
 
 
 def test_folder_is_not_made_if_the_network_address_is_taken(two_groups, scripted, tmp_path) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        network = Network(listen=(f"tcp/127.0.0.1:{taken.getsockname()[1]}",))
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        network = Network(listen=(f"tcp/127.0.0.1:{listener.getsockname()[1]}",))
         simulation = Simulation(two_groups, gateways=Gateways({"": "scripted"}, network=network), out=tmp_path / "run")
         assert "free" in refused(simulation.__enter__).expected
     assert not (tmp_path / "run").exists()

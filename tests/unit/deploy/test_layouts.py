@@ -29,12 +29,12 @@ def local() -> Result:
     return run(LOSSY, overrides=SHORT)
 
 
-def encoded(monkeypatch: pytest.MonkeyPatch, scenario: Path, **given) -> Result:
+def encoded(monkeypatch: pytest.MonkeyPatch, scenario: Path, **options) -> Result:
     """A run through frames, with its robots in three parts, unless `given` says otherwise."""
-    seeds = given.pop("seeds", None)
-    overrides = given.pop("overrides", SHORT)
+    seeds = options.pop("seeds", None)
+    overrides = options.pop("overrides", SHORT)
     with monkeypatch.context() as patched:
-        patched.setattr(backends, "LocalBackend", partial(EncodedBackend, **given))
+        patched.setattr(backends, "LocalBackend", partial(EncodedBackend, **options))
         result = run(scenario, overrides=overrides, seeds=seeds)
     assert not any(name.endswith("_frames") for name in result.counts), result.counts
     return result

@@ -32,10 +32,10 @@ def at_exit(monkeypatch):
     registered = []
     monkeypatch.setenv(KERNEL_CACHE, "x")
     monkeypatch.delenv(KERNEL_CACHE)
-    monkeypatch.setattr(atexit, "register", lambda act, *given, **_: registered.append((act, given)))
+    monkeypatch.setattr(atexit, "register", lambda act, *arguments, **_: registered.append((act, arguments)))
     yield registered
-    for act, given in registered:
-        act(*given)
+    for act, arguments in registered:
+        act(*arguments)
 
 
 def test_kernels_without_a_writable_cache_are_kept_for_this_process(monkeypatch, tmp_path, at_exit):
@@ -44,12 +44,12 @@ def test_kernels_without_a_writable_cache_are_kept_for_this_process(monkeypatch,
     monkeypatch.setattr(host, "CODE", tmp_path / "nowhere")
     monkeypatch.setenv("XDG_CACHE_HOME", str(file))  # no folder can be made in it
     keep_kernels()
-    place = Path(os.environ[KERNEL_CACHE])
-    assert place.is_dir()
+    folder = Path(os.environ[KERNEL_CACHE])
+    assert folder.is_dir()
     keep_kernels()  # as does a process that this one starts
-    assert os.environ[KERNEL_CACHE] == str(place)
+    assert os.environ[KERNEL_CACHE] == str(folder)
     assert len(at_exit) == 1
-    assert at_exit[0][1] == (str(place),)
+    assert at_exit[0][1] == (str(folder),)
 
 
 def test_kernels_are_kept_in_the_users_cache_or_next_to_the_code(monkeypatch, tmp_path, at_exit):
@@ -117,9 +117,9 @@ def test_sockets_of_killed_runs_go_with_the_next_run_and_no_others(base):
                 os.utime(folder / SOCKET, ns=(long_ago_ns, long_ago_ns))
         (base / f"{PRIVATE}empty").mkdir()  # its run has not come so far
         with local_endpoint() as endpoint:
-            here = {path.name.removeprefix(PRIVATE) for path in base.iterdir()}
-            assert {"alive", "new", "empty"} < here
-            assert "old" not in here
+            names = {path.name.removeprefix(PRIVATE) for path in base.iterdir()}
+            assert {"alive", "new", "empty"} < names
+            assert "old" not in names
             assert endpoint.endswith(f"/{SOCKET}")
 
 
@@ -145,9 +145,9 @@ def test_machine_limits_are_refused_with_cause_and_remedy():
     assert "temporarily unavailable" in str(refusal(BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")))
     assert "raise the limit" in str(refusal(RuntimeError("can't start new thread")))
     assert "fewer robots" in str(refusal(MemoryError()))
-    with pytest.raises(MemoryError) as told:
+    with pytest.raises(MemoryError) as error:
         np.empty(2**56)
-    assert "Unable to allocate" in str(refusal(told.value))
+    assert "Unable to allocate" in str(refusal(error.value))
     assert (
         refusal(RuntimeError("wrong")) is refusal(FileNotFoundError(errno.ENOENT, "x")) is refusal(KeyError()) is None
     )

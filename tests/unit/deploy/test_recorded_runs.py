@@ -87,8 +87,8 @@ def test_recorded_tables_equal_the_observers_view_and_the_summary(tmp_path):
         rows = slice(arena * 20, arena * 20 + 20)
         ticks = recorded.ticks(arena)
         pose = np.array([truth.pose[rows] for truth in keeper.truths], np.float32)
-        for place, column in enumerate(("x_m", "y_m", "heading_rad")):
-            assert np.array_equal(ticks[column].to_numpy(), pose[:, :, place])
+        for index, column in enumerate(("x_m", "y_m", "heading_rad")):
+            assert np.array_equal(ticks[column].to_numpy(), pose[:, :, index])
         assert ticks["alive"].to_list() == [truth.alive[rows].tolist() for truth in keeper.truths]
         states = [[truth.states[code] for code in truth.state[rows]] for truth in keeper.truths]
         assert ticks["state"].to_list() == states
@@ -134,10 +134,10 @@ def test_tables_of_packets_and_radio_are_the_same_in_every_layout(tmp_path, scen
 
 
 def test_full_disk_leaves_the_run_going_and_its_tables_readable(tmp_path, monkeypatch, capfd):
-    left = iter(range(2))
+    writes = iter(range(2))
 
     def full(frame, path):
-        if next(left, None) is None:
+        if next(writes, None) is None:
             raise OSError(28, "No space left on device")
         write_file(frame, path)
 

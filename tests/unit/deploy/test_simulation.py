@@ -208,12 +208,12 @@ def test_seeds_written_as_a_list_are_read_back(seeds):
 
 
 @pytest.mark.parametrize(
-    "of",
+    "seeds",
     ["0", "", "x", "0.5", "5:5", "9:1", "1,1", "-1,2", "1:99999999999999999999", "9" * 30, [], [1.5], [-1], [2**63]],
 )
-def test_seed_list_that_cannot_be_is_refused_by_its_option(of):
+def test_seed_list_that_cannot_be_is_refused_by_its_option(seeds):
     with refused_input("--record-seeds"):
-        seed_list(of, "--record-seeds")
+        seed_list(seeds, "--record-seeds")
 
 
 @pytest.mark.parametrize(
@@ -243,9 +243,9 @@ def test_runners_are_a_number_or_a_word(runners, count):
     assert runner_count(runners, 6) == count
 
 
-@pytest.mark.parametrize(("asked", "factor"), [(None, None), (1, 1.0), ("0.5", 0.5), (1e6, 1e6), ("1e-3", 0.001)])
-def test_realtime_factor_may_be_text(asked, factor):
-    assert parse_factor(asked) == factor
+@pytest.mark.parametrize(("value", "factor"), [(None, None), (1, 1.0), ("0.5", 0.5), (1e6, 1e6), ("1e-3", 0.001)])
+def test_realtime_factor_may_be_text(value, factor):
+    assert parse_factor(value) == factor
 
 
 class TakenPlace(Observer):
@@ -274,9 +274,9 @@ def test_lost_summary_raises_as_a_simulation_is_left_unless_an_error_ended_it(tm
     def simulation(folder) -> Simulation:
         return Simulation(LOSSY, overrides=SHORT, out=folder, observers=[TakenPlace(folder)])
 
-    with pytest.raises(RecordFailed), simulation(tmp_path / "left") as left:
-        left.run(5)
-    assert left.result.ticks == 5
+    with pytest.raises(RecordFailed), simulation(tmp_path / "left") as opened:
+        opened.run(5)
+    assert opened.result.ticks == 5
     with pytest.raises(ZeroDivisionError), simulation(tmp_path / "failed"):
         raise ZeroDivisionError
     assert str(tmp_path / "failed" / "summary.json") in capsys.readouterr().err

@@ -101,4 +101,4 @@ def test_metrics_of_an_arena_are_the_same_alone_and_among_others():
     beside = run(LOSSY, seeds=[5, 2, 3], overrides=SETTING).arenas[1].metrics
     assert beside == alone
     # What has no value is the same everywhere: nobody tells a number here, and some things do not happen.
-    assert sum(found.mean is not None for found in alone.values()) > 0.7 * len(METRICS)
+    assert sum(summary.mean is not None for summary in alone.values()) > 0.7 * len(METRICS)

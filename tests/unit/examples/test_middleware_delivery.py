@@ -25,8 +25,8 @@ def logs(*messages, halves=(True, False), split_s=(20.0, 40.0), end_s=60.0):
     return Logs(pl.DataFrame(list(messages), schema=list(names), orient="row"), np.array(halves), split_s, end_s)
 
 
-def of_topic(topic, found):
-    return next(row for row in results(found) if row["topic"] == topic)
+def of_topic(topic, result):
+    return next(row for row in results(result) if row["topic"] == topic)
 
 
 def test_record_is_that_of_the_programs():
@@ -59,7 +59,7 @@ def test_age_is_that_of_the_newest_message_also_if_older_ones_arrive_after_it():
 
 
 def test_delivery_counts_by_phase_and_by_half():
-    found = logs(
+    result = logs(
         ("state", 0, 1, 11.0, 11.25),  # before the split
         ("state", 0, 1, 12.0, None),
         ("state", 1, 0, 12.0, 12.75),
@@ -71,16 +71,16 @@ def test_delivery_counts_by_phase_and_by_half():
         ("state", 0, 1, 59.0, None),  # nor early enough to arrive
         halves=(True, False, True),
     )
-    row = of_topic("state", found)
+    row = of_topic("state", result)
     assert row["delivery_before"] == pytest.approx(2 / 3)
     assert row["delivery_across"] == pytest.approx(1 / 2)
     assert (row["delivery_within"], row["delivery_after"]) == (1.0, 1.0)
     assert (row["latency_p50_ms"], row["latency_p99_ms"]) == pytest.approx((500.0, 745.0))
-    assert of_topic("map", found)["delivery_before"] is None
+    assert of_topic("map", result)["delivery_before"] is None
 
 
 def test_discovery_and_recovery_are_times_to_the_first_message_of_a_pair():
-    found = logs(
+    result = logs(
         ("state", 0, 1, 1.0, 3.0),
         ("state", 0, 1, 2.0, 2.5),
         ("state", 1, 0, 2.0, 6.0),
@@ -90,7 +90,7 @@ def test_discovery_and_recovery_are_times_to_the_first_message_of_a_pair():
         ("state", 1, 0, 41.0, None),
         halves=(True, False, True),
     )
-    row = of_topic("state", found)
+    row = of_topic("state", result)
     assert (row["pairs"], row["discovered"], row["discovery_p50_s"], row["discovery_max_s"]) == (3, 2, 6.0, None)
     assert (row["cut_pairs"], row["recovered"], row["recovery_p50_s"], row["recovery_max_s"]) == (2, 1, 7.0, None)
 
@@ -98,8 +98,8 @@ def test_discovery_and_recovery_are_times_to_the_first_message_of_a_pair():
 def test_age_before_the_split_is_averaged_over_time_and_pairs():
     """One pair hears each 2 s, at once: 1 s old on average. The other never hears: 15 s."""
     times = [2.0 * k for k in range(5, 11)]
-    found = logs(*(("state", 0, 1, t, t) for t in times), ("state", 1, 0, 10.0, None))
-    row = of_topic("state", found)
+    result = logs(*(("state", 0, 1, t, t) for t in times), ("state", 1, 0, 10.0, None))
+    row = of_topic("state", result)
     assert row["age_mean_s"] == pytest.approx((1.0 + 15.0) / 2, abs=0.02)
     assert row["age_p95_s"] == pytest.approx(19.0, abs=0.02)
 

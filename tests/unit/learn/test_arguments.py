@@ -73,11 +73,11 @@ def test_observations_with_groups_of_unlike_length_are_copies() -> None:
     table = read_toml(FLOCKING)
     table["robots"]["flock"]["count"] = 2
     table["robots"]["others"] = {"body": "footbot", "count": 2, "agent": "swarmwire.agent.behaviours:Diffusion"}
-    written, left = (vector_env(table, 1) for _ in range(2))
-    seen = [envs.reset()[0] for envs in (written, left)]
+    written, unwritten = (vector_env(table, 1) for _ in range(2))
+    observations = [envs.reset()[0] for envs in (written, unwritten)]
     still = np.zeros(written.action_space.shape, np.float32)
-    seen[0][:] = 7.0
-    np.testing.assert_array_equal(written.step(still)[0], left.step(still)[0])
+    observations[0][:] = 7.0
+    np.testing.assert_array_equal(written.step(still)[0], unwritten.step(still)[0])
 
 
 @pytest.mark.parametrize(

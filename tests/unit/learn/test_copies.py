@@ -28,11 +28,11 @@ def right_side(state: ArenaState) -> Any:
     return (state.pose[:, 0, 0] > 0.0) & (state.time_s > 0.25)
 
 
-def _episode(env: Any, seen: dict[str, Any], steps: int) -> list[Any]:
+def _episode(env: Any, observations: dict[str, Any], steps: int) -> list[Any]:
     results: list[Any] = []
     for _ in range(steps):
-        results.append(env.step({agent: rule(seen[agent]) for agent in env.agents}))
-        seen = results[-1][0]
+        results.append(env.step({agent: rule(observations[agent]) for agent in env.agents}))
+        observations = results[-1][0]
     return results
 
 
@@ -62,18 +62,18 @@ def test_parallel_env_copies_run_the_same_episodes_from_where_it_is(copied: Copy
 def test_vector_env_copies_continue_arenas_of_various_ages(mode: Any) -> None:
     randomise = {"radio.loss": Choice([0.0, 0.5])}
     envs = vector_env(FLOCKING, 4, overrides=SHORT, autoreset=mode, terminated=right_side, randomise=randomise, seed=3)
-    seen, _ = envs.reset()
+    observations, _ = envs.reset()
     terminated: Any = None
     for _ in range(4):
-        seen, _, terminated, _, _ = envs.step(rule(seen))
+        observations, _, terminated, _, _ = envs.step(rule(observations))
     if mode == "disabled":
-        seen, _ = envs.reset(options={"reset_mask": terminated})
+        observations, _ = envs.reset(options={"reset_mask": terminated})
     assert envs.arenas.worlds > 1
     twin = pickle.loads(pickle.dumps(envs))
     for _ in range(4):
-        result = envs.step(rule(seen))
-        assert data_equivalence(twin.step(rule(seen)), result)
-        seen = result[0]
+        result = envs.step(rule(observations))
+        assert data_equivalence(twin.step(rule(observations)), result)
+        observations = result[0]
     assert any(envs.trajectory_sha256)
     assert twin.trajectory_sha256 == envs.trajectory_sha256
 

@@ -27,12 +27,12 @@ SHORT = ("duration_s=2", "robots.flock.count=6")
 
 def _hashes(seeds: list[int], *overrides: str) -> list[str]:
     """The trajectory hashes of ordinary runs of the rule as an agent, on their own."""
-    found: list[str] = []
+    hashes: list[str] = []
     for seed in seeds:
         with Simulation(FLOCKING, seed=seed, overrides=[*SHORT, AGENT, "robots.flock.params={}", *overrides]) as run:
             run.run()
-        found += run.hashes()
-    return found
+        hashes += run.hashes()
+    return hashes
 
 
 def _environment(**options: Any) -> Any:
@@ -47,11 +47,11 @@ def _still(env: Any) -> dict[str, Any]:
 
 def test_episode_equals_the_run_of_its_seed_with_the_same_actions() -> None:
     envs = _environment(arenas=3, seed=4)
-    seen, _ = envs.reset()
+    observations, _ = envs.reset()
     for _ in range(19):
-        seen, _, terminated, truncated, _ = envs.step(rule(seen))
+        observations, _, terminated, truncated, _ = envs.step(rule(observations))
         assert not (terminated | truncated).any()
-    _, _, _, truncated, infos = envs.step(rule(seen))
+    _, _, _, truncated, infos = envs.step(rule(observations))
     assert truncated.all()
     assert infos["episode_seed"].tolist() == [4, 5, 6]
     assert list(envs.trajectory_sha256) == _hashes([4, 5, 6])
@@ -63,10 +63,10 @@ def test_arenas_that_begin_alone_stay_ordinary_runs_and_so_do_the_others() -> No
 
     for mode in ("next_step", "same_step"):
         envs = _environment(arenas=3, seed=4, autoreset=mode, terminated=terminated)
-        seen, _ = envs.reset()
+        observations, _ = envs.reset()
         ended: list[tuple[int, int, str]] = []
         for step in range(20):
-            seen, _, over, truncated, infos = envs.step(rule(seen))
+            observations, _, over, truncated, infos = envs.step(rule(observations))
             facts = infos.get("final_info", infos)
             now = np.flatnonzero(over | truncated)
             ended += [(step, facts["episode_seed"][arena], envs.trajectory_sha256[arena]) for arena in now]
@@ -86,11 +86,11 @@ def test_randomised_values_of_an_episode_are_drawn_from_its_seed() -> None:
         "robots.flock.body_overrides.sensors.proximity.drop_out": Uniform(0.0, 0.5),
     }
     envs = _environment(arenas=4, seed=1, randomise=randomise)
-    seen, infos = envs.reset()
+    observations, infos = envs.reset()
     values = [{path: infos[path][arena] for path in randomise} for arena in range(4)]
     assert {value["radio.loss"] for value in values} == {0.0, 0.9}
     for _ in range(20):
-        seen, *_ = envs.step(rule(seen))
+        observations, *_ = envs.step(rule(observations))
     for arena, value in enumerate(values):
         overrides = [f"{path}={number}" for path, number in value.items()]
         assert [envs.trajectory_sha256[arena]] == _hashes([arena + 1], *overrides)
@@ -138,12 +138,12 @@ class _Single(gymnasium.Env[Any, Any]):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
         super().reset(seed=seed)
-        seen, infos = self._envs.reset(seed=seed)
-        return seen[0], infos
+        observations, infos = self._envs.reset(seed=seed)
+        return observations[0], infos
 
     def step(self, action: Any) -> Any:
-        seen, reward, terminated, truncated, infos = self._envs.step(action[None])
-        return seen[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), infos
+        observations, reward, terminated, truncated, infos = self._envs.step(action[None])
+        return observations[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), infos
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")  # of what is advised: one row of numbers, finite bounds
@@ -159,23 +159,23 @@ def test_without_autoreset_an_arena_waits_for_its_reset() -> None:
         arenas=3, seed=4, autoreset="disabled", terminated=terminated, reward=lambda state: np.ones(len(state.time_s))
     )
     assert envs.metadata["autoreset_mode"] == AutoresetMode.DISABLED
-    seen, _ = envs.reset()
+    observations, _ = envs.reset()
     for step in range(20):
-        seen, reward, over, truncated, infos = envs.step(rule(seen))
+        observations, reward, over, truncated, infos = envs.step(rule(observations))
         waits = step > 2
         assert reward.tolist() == [1.0, 0.0 if waits else 1.0, 1.0]
         assert over.tolist() == [False, step >= 2, False]
         assert truncated.tolist() == [step == 19, False, step == 19]
-        assert seen[1].any() != waits
+        assert observations[1].any() != waits
         if step in (2, 19):
             ended = infos["_episode_seed"]
             assert ended.tolist() == ([False, True, False] if step == 2 else [True, False, True])
             expected = _hashes([5], "duration_s=0.3") if step == 2 else _hashes([4, 6])
             assert np.array(envs.trajectory_sha256)[ended].tolist() == expected
     with pytest.raises(RuntimeError, match="reset"):
-        envs.step(rule(seen))
-    seen, _ = envs.reset(options={"reset_mask": np.array([True, True, False])})
-    _, reward, over, truncated, _ = envs.step(rule(seen))
+        envs.step(rule(observations))
+    observations, _ = envs.reset(options={"reset_mask": np.array([True, True, False])})
+    _, reward, over, truncated, _ = envs.step(rule(observations))
     assert reward.tolist() == [1.0, 1.0, 0.0]
     assert truncated.tolist() == [False, False, True]
     assert envs.arenas.worlds == 1
@@ -186,11 +186,11 @@ def test_vector_env_is_one_of_gymnasiums(mode: Any) -> None:
     envs = _environment(arenas=3, reward=lambda state: np.ones(len(state.time_s)), autoreset=mode)
     assert envs.metadata["autoreset_mode"] == AutoresetMode({"next_step": "NextStep", "same_step": "SameStep"}[mode])
     recorded = RecordEpisodeStatistics(envs)
-    seen, _ = recorded.reset(seed=3)
+    observations, _ = recorded.reset(seed=3)
     recorded.action_space.seed(3)
     for _ in range(45):
-        assert recorded.observation_space.contains(seen)
-        seen, reward, terminated, truncated, infos = recorded.step(recorded.action_space.sample())
+        assert recorded.observation_space.contains(observations)
+        observations, reward, terminated, truncated, infos = recorded.step(recorded.action_space.sample())
         assert (reward.shape, reward.dtype) == ((3,), np.float64)
         assert (terminated.dtype, truncated.dtype) == (np.bool_, np.bool_)
         if truncated.any():
@@ -201,13 +201,13 @@ def test_vector_env_is_one_of_gymnasiums(mode: Any) -> None:
 
 def test_rewards_are_weighted_metrics_or_a_number_per_robot() -> None:
     envs = _environment(arenas=2, reward={"order": 2.0, "wall_contacts": -1.0})
-    seen, _ = envs.reset()
+    observations, _ = envs.reset()
     with Simulation(FLOCKING, seeds="1:3", overrides=[*SHORT, AGENT, "robots.flock.params={}"]) as run:
         for _ in range(10):
             before = run.metrics.latest.get("wall_contacts", np.zeros(2))
             run.step()
             latest = run.metrics.latest
-            seen, reward, *_ = envs.step(rule(seen))
+            observations, reward, *_ = envs.step(rule(observations))
             np.testing.assert_array_equal(
                 reward, 2.0 * latest["order"] - (latest["wall_contacts"] - np.nan_to_num(before))
             )
@@ -231,17 +231,17 @@ def test_other_groups_run_their_agents() -> None:
     table["robots"]["others"] = {"body": "footbot", "count": 3, "agent": "swarmwire.agent.behaviours:Diffusion"}
     state: list[ArenaState] = []
     envs = vector_env(table, arenas=2, groups=["flock"], reward=lambda now: state.append(now) or np.zeros(2))
-    seen, _ = envs.reset()
+    observations, _ = envs.reset()
     count = table["robots"]["flock"]["count"]
-    assert seen.shape[1] == count
+    assert observations.shape[1] == count
     for _ in range(5):
         envs.step(np.zeros_like(envs.action_space.sample()))
     assert (state[-1].command[:, :count] == 0.0).all()
     assert (state[-1].command[:, count:, 0] > 0.0).all()
 
     both = vector_env(table, arenas=2)
-    seen, _ = both.reset()
-    assert seen.shape[1] == count + 3
+    observations, _ = both.reset()
+    assert observations.shape[1] == count + 3
 
 
 @pytest.mark.parametrize(
@@ -251,10 +251,10 @@ def test_other_groups_run_their_agents() -> None:
 )
 def test_shipped_scenarios_are_environments(path: Path) -> None:
     env = parallel_env(path)
-    seen, _ = env.reset()
+    observations, _ = env.reset()
     for _ in range(2):
-        assert all(env.observation_space(agent).contains(seen[agent]) for agent in env.agents)
-        seen, *_ = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+        assert all(env.observation_space(agent).contains(observations[agent]) for agent in env.agents)
+        observations, *_ = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
 
 
 @pytest.mark.parametrize(

@@ -234,8 +234,8 @@ def test_ten_robots_spread_to_the_target_distance_only_with_radio():
     assert spread_m("robots.flock.params={light=0.0}", "radio.loss=1.0") < 0.4
 
 
-def values(seen: Seen) -> np.ndarray:
-    distance_m = np.array([seen.get(angle, np.inf) for angle in ANGLES]) * DIAMETER_M
+def values(rays: Seen) -> np.ndarray:
+    distance_m = np.array([rays.get(angle, np.inf) for angle in ANGLES]) * DIAMETER_M
     return np.where(np.isfinite(distance_m), RESPONSE.value(np.minimum(distance_m, 1.0)), 0.0)
 
 

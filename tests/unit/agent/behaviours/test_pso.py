@@ -28,11 +28,11 @@ def test_target_is_within_reach_until_the_next_update(pull: float) -> None:
 
 
 def test_velocity_changes_once_per_update_period() -> None:
-    robot, seen = SingleParticle(), list[tuple[float, float]]()
+    robot, velocities = SingleParticle(), list[tuple[float, float]]()
     for _ in range(201):
         robot.step()
-        seen.append(robot.vector("velocity"))
-    assert [tick for tick in range(1, 201) if seen[tick] != seen[tick - 1]] == [100, 200]
+        velocities.append(robot.vector("velocity"))
+    assert [tick for tick in range(1, 201) if velocities[tick] != velocities[tick - 1]] == [100, 200]
 
 
 def test_velocity_is_inertia_plus_attractions_within_their_weights() -> None:

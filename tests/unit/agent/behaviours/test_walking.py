@@ -65,9 +65,9 @@ def test_spells_are_exponential_or_constant():
 
 def test_spell_lasts_its_length_over_the_speed():
     walker = Walker(RandomWalk, spell_m=0.5, exponential=False, persistence=1.0)
-    left = [walker.step() and float(walker.memory.remaining_m[0]) for _ in range(49)]
-    assert left[0] == pytest.approx(0.49)
-    assert left[-1] == pytest.approx(0.01)
+    remaining_m = [walker.step() and float(walker.memory.remaining_m[0]) for _ in range(49)]
+    assert remaining_m[0] == pytest.approx(0.49)
+    assert remaining_m[-1] == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize("near_rad", [0.0, 0.9, -0.9])
@@ -136,8 +136,8 @@ def test_aggregation_leaves_less_often_with_more_near_neighbours(neighbours, cro
     many = gatherers(MANY, leave_per_s=5.0, return_per_s=0.0, **params)
     many.step(NEAR)
     many.step(*neighbours)
-    left = np.mean(many.memory.phase == REPEL)
-    assert left == pytest.approx(1.0 - np.exp(-0.5 / held), abs=4.0 * (0.25 / MANY) ** 0.5)
+    share = np.mean(many.memory.phase == REPEL)
+    assert share == pytest.approx(1.0 - np.exp(-0.5 / held), abs=4.0 * (0.25 / MANY) ** 0.5)
 
 
 def test_aggregation_repels_after_leaving_then_approaches_again():
@@ -299,11 +299,11 @@ def test_threshold_rule_backs_off_left_from_objects_on_any_side(angle_deg: float
     assert (other.sees((angle_deg, 0.31)), other.sees((angle_deg, 0.29))) == ((0.15, 0.0), (-0.05, -1.0))
 
 
-def rays(*seen: tuple[int, float]) -> FloatArray:
+def rays(*distances: tuple[int, float]) -> FloatArray:
     """Answers of a foot-bot's rays that see something at a distance from the rim."""
     value = np.zeros(24)
     assert FOOTBOT.proximity is not None
-    for ray, far_m in seen:
+    for ray, far_m in distances:
         value[ray] = FOOTBOT.proximity.response.value(np.array(far_m))
     return value
 

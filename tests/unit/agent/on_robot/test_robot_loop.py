@@ -380,9 +380,9 @@ class _Full:
     def write(self, data) -> int:
         if self.room <= 0:
             raise OSError(errno.ENOSPC, "No space left on device")
-        taken = self._raw.write(data[: self.room])
-        self.room -= taken
-        return taken
+        count = self._raw.write(data[: self.room])
+        self.room -= count
+        return count
 
     def __getattr__(self, name):
         return getattr(self._raw, name)

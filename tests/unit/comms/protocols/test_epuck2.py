@@ -113,11 +113,11 @@ def test_led_of_one_colour_lights_from_half_intensity() -> None:
         ALL_DARK.with_changed({10: 0xFF0000})
 
 
-@given(start=STEPS, gone=st.lists(st.tuples(st.integers(-32768, 32767), st.integers(-32768, 32767)), max_size=30))
-def test_odometer_counts_across_counter_wraps(start: int, gone: list[tuple[int, int]]) -> None:
+@given(start=STEPS, steps=st.lists(st.tuples(st.integers(-32768, 32767), st.integers(-32768, 32767)), max_size=30))
+def test_odometer_counts_across_counter_wraps(start: int, steps: list[tuple[int, int]]) -> None:
     odometer = Odometer()
     odometer.update(start, start)
-    for left, right in accumulate(gone, lambda before, more: (before[0] + more[0], before[1] + more[1])):
+    for left, right in accumulate(steps, lambda before, more: (before[0] + more[0], before[1] + more[1])):
         odometer.update(wrapped(start + left), wrapped(start + right))
         assert (odometer.left, odometer.right) == (left, right)
 

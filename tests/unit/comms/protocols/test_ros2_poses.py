@@ -58,9 +58,9 @@ def test_poses_of_a_tf_message_are_named_by_parent_and_frame():
 
     transforms = [stamped("map", "a", 1.0), stamped("odom", "b", 2.0), stamped("/map", "/c", 3.0)]
     message = MESSAGES.decode(TRANSFORMS, independent.TFMessage(transforms).serialize())
-    found = {pose.name: space_pose(pose.position, pose.orientation) for pose in poses_of(TRANSFORMS, message)}
-    assert found["map a"] == pytest.approx((1.0, 0.0, 0.5, 0.5))
-    assert {name: pose.x_m for name, pose in found.items()} == {"map a": 1.0, "odom b": 2.0, "map c": 3.0}
+    positions = {pose.name: space_pose(pose.position, pose.orientation) for pose in poses_of(TRANSFORMS, message)}
+    assert positions["map a"] == pytest.approx((1.0, 0.0, 0.5, 0.5))
+    assert {name: pose.x_m for name, pose in positions.items()} == {"map a": 1.0, "odom b": 2.0, "map c": 3.0}
     assert {stamp_ns(pose.header) for pose in poses_of(TRANSFORMS, message)} == {5}
 
 
@@ -73,9 +73,9 @@ def test_poses_of_odometry_and_pose_stamped_are_one_each():
         POSE_STAMPED: independent.PoseStamped(independent.header(5, "map"), pose),
     }
     for kind, message in sent.items():
-        [found] = poses_of(kind, MESSAGES.decode(kind, message.serialize()))
-        assert (found.name, stamp_ns(found.header)) == ("", 5)
-        assert space_pose(found.position, found.orientation) == pytest.approx((1.0, 2.0, 3.0, 0.5))
+        [message_pose] = poses_of(kind, MESSAGES.decode(kind, message.serialize()))
+        assert (message_pose.name, stamp_ns(message_pose.header)) == ("", 5)
+        assert space_pose(message_pose.position, message_pose.orientation) == pytest.approx((1.0, 2.0, 3.0, 0.5))
 
 
 def test_frame_whose_name_is_no_text_is_malformed():

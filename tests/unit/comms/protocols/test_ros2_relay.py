@@ -182,6 +182,6 @@ def test_tags_of_messages_are_none_of_frames_the_relay_and_crtp():
     def plain_tag(name: str) -> int:
         return 1 + int.from_bytes(blake2b(f"{name}()".encode(), digest_size=2).digest(), "little") % 0xFFFF
 
-    frame, taken = 0x5302, (0x5302, RELAY_TAG, CRTP_TAG)
-    names = [next(name for name in map("Try{}".format, count()) if plain_tag(name) == tag) for tag in taken]
-    assert [type(name, (Message,), {}).tag for name in names] == [frame + len(taken)] * 3
+    frame, tags = 0x5302, (0x5302, RELAY_TAG, CRTP_TAG)
+    names = [next(name for name in map("Try{}".format, count()) if plain_tag(name) == tag) for tag in tags]
+    assert [type(name, (Message,), {}).tag for name in names] == [frame + len(tags)] * 3

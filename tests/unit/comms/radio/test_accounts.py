@@ -210,10 +210,10 @@ def test_arena_that_left_reports_nothing(radio: str, over: int):
     medium = sent(radio)
     assert medium.advance(TICK_NS // 2)[0].receiver.tolist() == [0, 2, 3]
     medium.leave(np.arange(2) == over)
-    news, left = medium.step(TICK_NS, POSE), 1 - over
-    assert news.received.receiver.tolist() == [[0, 2], [3]][left]
-    assert {news.received.payloads.row(int(row)) for row in news.received.payload} == {PAYLOADS[left]}
-    assert set(news.finished.arena.tolist()) == set(news.departed.arena.tolist()) == {left}
+    news, remaining = medium.step(TICK_NS, POSE), 1 - over
+    assert news.received.receiver.tolist() == [[0, 2], [3]][remaining]
+    assert {news.received.payloads.row(int(row)) for row in news.received.payload} == {PAYLOADS[remaining]}
+    assert set(news.finished.arena.tolist()) == set(news.departed.arena.tolist()) == {remaining}
 
 
 @pytest.mark.parametrize("over", [0, 1])

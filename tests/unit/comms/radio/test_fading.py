@@ -161,9 +161,9 @@ def test_fading_of_a_single_link_has_the_mean_power():
 
 @given(INDICES, INDICES, METRES, METRES, METRES, METRES, st.floats(0.0, 30.0))
 def test_fading_is_equal_in_both_directions(a, b, ax, ay, bx, by, k):
-    there, back = (a, b + 1000, PER_M, ax, ay, bx, by), (b + 1000, a, PER_M, bx, by, ax, ay)
-    assert rayleigh_gain(KEY, *there) == rayleigh_gain(KEY, *back)
-    assert rician_gain(KEY, *there, k) == rician_gain(KEY, *back, k)
+    forth, back = (a, b + 1000, PER_M, ax, ay, bx, by), (b + 1000, a, PER_M, bx, by, ax, ay)
+    assert rayleigh_gain(KEY, *forth) == rayleigh_gain(KEY, *back)
+    assert rician_gain(KEY, *forth, k) == rician_gain(KEY, *back, k)
 
 
 @pytest.mark.parametrize("ends", [(1.0, 2.0, 30.0, -7.0), (0.0, 0.0, 0.0, 0.0)])
@@ -318,8 +318,8 @@ def test_shadowing_of_a_single_arena_has_the_expected_variance():
 
 @given(COORDINATES, COORDINATES, COORDINATES, COORDINATES)
 def test_shadowing_is_equal_in_both_directions(ax: float, ay: float, bx: float, by: float):
-    there, back = (shadowing_db(SHADOW_WAVES[0], AMPLITUDE_DB, *ends) for ends in ((ax, ay, bx, by), (bx, by, ax, ay)))
-    assert there == back
+    forth, back = (shadowing_db(SHADOW_WAVES[0], AMPLITUDE_DB, *ends) for ends in ((ax, ay, bx, by), (bx, by, ax, ay)))
+    assert forth == back
 
 
 def test_shadowing_of_touching_robots_is_zero():

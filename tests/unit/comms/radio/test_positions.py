@@ -115,8 +115,8 @@ def test_positions_interpolated_are_the_same_alone_and_beside_other_arenas():
         for tick, pose in enumerate(poses):
             result.news.append(medium.step(tick * TICK_NS, pose[rows]))
             medium.send(tick * TICK_NS, tick, everybody(len(pose[rows]))(tick))
-        found = result.rows("received", "receiver", "sender_index", "sequence", "received_at_ns")
-        return [row for row in found if row[0] < 6]
+        packets = result.rows("received", "receiver", "sender_index", "sequence", "received_at_ns")
+        return [row for row in packets if row[0] < 6]
 
     radio = replace(drawing("csma-802154"), positions="interpolated")
     together = received(make_medium(radio, 6, [1, 2]), slice(None))

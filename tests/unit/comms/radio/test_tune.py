@@ -329,10 +329,10 @@ def test_partition_one_way_removes_the_edge():
     def apart(held: Disruption) -> None:
         held.one_way = np.array([[1, 2]])
 
-    there, back = (
+    forth, back = (
         ran(make_medium(with_access("aloha"), 2), PHY_PAIR, lambda _, sender=sender: packets([sender]), {0: apart}, 4)
         for sender in (0, 1)
     )
-    assert there.fates() == {"PARTITIONED": 4}
-    assert not len(there.edges)
+    assert forth.fates() == {"PARTITIONED": 4}
+    assert not len(forth.edges)
     assert back.fates()["RECEIVED"] >= 3

@@ -248,11 +248,11 @@ def test_inbox_pops_once_in_order_and_counts_drops():
 
 
 def test_inbox_counts_every_drop_of_several_threads():
-    inbox, taken = BoundedInbox[int](50), list[int]()
+    inbox, items = BoundedInbox[int](50), list[int]()
     threads = [threading.Thread(target=lambda: [inbox.put(item) for item in range(2000)]) for _ in range(4)]
     for thread in threads:
         thread.start()
     while any(thread.is_alive() for thread in threads):
-        taken += inbox.pop_all()
-    taken += inbox.pop_all()
-    assert len(taken) + inbox.dropped == 8000
+        items += inbox.pop_all()
+    items += inbox.pop_all()
+    assert len(items) + inbox.dropped == 8000

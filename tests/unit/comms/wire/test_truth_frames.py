@@ -352,14 +352,14 @@ def test_arena_of_several_is_a_run_of_its_own(glimpse, arena):
         assert (part.edges + rows.start).tolist() == [e for e in truth.edges.tolist() if e[0] // ROBOTS == arena]
     if truth.finished is not None and part.finished is not None:
         assert len(part.finished.fate) == np.count_nonzero(truth.finished.arena == arena)
-    seen = [row for group in part.readings.values() for row in (group.rows + rows.start).tolist()]
-    assert seen == [row for g in truth.readings.values() for row in g.rows.tolist() if row // ROBOTS == arena]
+    sensor_rows = [row for group in part.readings.values() for row in (group.rows + rows.start).tolist()]
+    assert sensor_rows == [row for g in truth.readings.values() for row in g.rows.tolist() if row // ROBOTS == arena]
 
 
 def test_departed_packets_are_split_by_arena():
     numbers = {field.name: np.arange(4) for field in fields(TransmissionRecords)}
-    left = TransmissionRecords(**{**numbers, "arena": np.array([1, 0, 1, 0])})
-    part = truth_of(replace(quiet().truth, departed=left), STATIC, 1).departed
+    packets = TransmissionRecords(**{**numbers, "arena": np.array([1, 0, 1, 0])})
+    part = truth_of(replace(quiet().truth, departed=packets), STATIC, 1).departed
     assert part is not None
     assert part.sender.tolist() == [0, 2]
     assert part.arena.tolist() == [0, 0]

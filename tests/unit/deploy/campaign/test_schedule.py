@@ -37,10 +37,10 @@ def test_executor_of_a_package_is_named_before_its_address(monkeypatch, tmp_path
 
 
 def test_by_default_there_is_a_worker_for_each_core():
-    found = open_executor("local", None, Path())
-    assert isinstance(found, LocalExecutor)
-    assert found.slots == usable_cores() >= 1
-    found.close()
+    executor = open_executor("local", None, Path())
+    assert isinstance(executor, LocalExecutor)
+    assert executor.slots == usable_cores() >= 1
+    executor.close()
     with pytest.raises(BadInput, match="^workers: expected at least 1, got 0"):
         open_executor("local", 0, Path())
 
@@ -75,10 +75,10 @@ def tasks(campaign, done=(), batch=None, workers=2):
 @given(st.integers(1, 5), st.integers(1, 130), st.integers(1, 8), st.sets(st.integers(0, 100)))
 def test_missing_runs_are_each_in_one_task_of_their_point(points, seeds, workers, done):
     campaign = made(points, seeds, recorded=(1,))
-    found = tasks(campaign, done, workers=workers)
-    runs = sorted(run for task in found for run in task.runs)
+    tasks_left = tasks(campaign, done, workers=workers)
+    runs = sorted(run for task in tasks_left for run in task.runs)
     assert runs == [run for run in range(campaign.runs) if run not in done]
-    for task in found:
+    for task in tasks_left:
         assert {campaign.point_of(run) for run in task.runs} == {task.point}
         assert task.overrides == (f"a={task.point}",)
         assert task.seeds == tuple(run % seeds + 1 for run in task.runs)
@@ -171,11 +171,11 @@ def test_message_arrives_complete_or_not_at_all(tmp_path):
     with path.open("wb") as file:
         send(file, {"a": [1, None, "x"], "b": b"\0"})
         send(file, {})
-    whole = path.read_bytes()
+    data = path.read_bytes()
     with path.open("rb") as file:
         assert [receive(file), receive(file), receive(file)] == [{"a": [1, None, "x"], "b": b"\0"}, {}, None]
-    for length in range(1, whole.index(b"x")):
-        path.write_bytes(whole[:length])
+    for length in range(1, data.index(b"x")):
+        path.write_bytes(data[:length])
         with path.open("rb") as file:
             assert receive(file) is None
 
@@ -219,8 +219,8 @@ def test_executor_address_of_another_form_is_refused(name):
 
 
 def test_workers_fit_with_the_same_versions_and_code_whatever_their_cpu():
-    here = environment()
-    assert fault_of(here, {**here, "cpu": "other"}) == ""
-    assert fault_of(here, {**here, "versions": {**here["versions"], "python": "3.9.0"}}).startswith("python is 3.9.0")
-    assert fault_of(here, {**here, "versions": {}}).startswith("python is not there")
-    assert "swarmwire.comms" in fault_of(here, {**here, "modules": {}})
+    own = environment()
+    assert fault_of(own, {**own, "cpu": "other"}) == ""
+    assert fault_of(own, {**own, "versions": {**own["versions"], "python": "3.9.0"}}).startswith("python is 3.9.0")
+    assert fault_of(own, {**own, "versions": {}}).startswith("python is not there")
+    assert "swarmwire.comms" in fault_of(own, {**own, "modules": {}})

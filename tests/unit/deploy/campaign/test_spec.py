@@ -12,8 +12,8 @@ from tests.support.refusals import refused_input
 
 
 def values(text):
-    found = vary_of(text).values
-    return found.values() if isinstance(found, ParameterRange) else list(found)
+    variation = vary_of(text).values
+    return variation.values() if isinstance(variation, ParameterRange) else list(variation)
 
 
 def test_range_is_evenly_spaced_in_short_decimals():
@@ -31,9 +31,9 @@ def test_range_with_log_has_equal_ratios():
 
 @given(st.integers(-1000, 1000), st.integers(1, 1000), st.integers(2, 50))
 def test_range_rises_from_its_first_to_its_last_value(first, width, count):
-    found = values(f"a={first}:{first + width}:{count}")
-    assert (found[0], found[-1], len(found)) == (first, first + width, count)
-    assert found == sorted(set(found))
+    numbers = values(f"a={first}:{first + width}:{count}")
+    assert (numbers[0], numbers[-1], len(numbers)) == (first, first + width, count)
+    assert numbers == sorted(set(numbers))
 
 
 def test_lists_are_toml_values_and_what_is_none_is_a_text():
@@ -67,15 +67,15 @@ def test_vary_text_that_is_no_list_or_range_is_refused(text):
 
 
 @pytest.mark.parametrize(
-    "given", [{"from": 0}, {"from": 0, "to": 1, "cuont": 3}, {"from": 0, "to": 1, "count": 1.5}, 3, []]
+    "value", [{"from": 0}, {"from": 0, "to": 1, "cuont": 3}, {"from": 0, "to": 1, "count": 1.5}, 3, []]
 )
-def test_vary_value_of_a_file_that_cannot_be_is_refused(given):
+def test_vary_value_of_a_file_that_cannot_be_is_refused(value):
     with pytest.raises(BadInput, match="^there: expected "):
-        vary_from("a", given, "there")
+        vary_from("a", value, "there")
 
 
-def points(kind, *texts, count=None, seed=1, whole=()):
-    return points_of(kind, [vary_of(text) for text in texts], count, seed, lambda path: path in whole)
+def points(kind, *texts, count=None, seed=1, integers=()):
+    return points_of(kind, [vary_of(text) for text in texts], count, seed, lambda path: path in integers)
 
 
 def test_grid_combines_all_values_and_varies_the_last_path_fastest():
@@ -91,28 +91,28 @@ def test_list_design_pairs_values_one_to_one():
 
 
 def test_ranges_over_whole_numbers_are_rounded():
-    assert points("grid", "a=5:20:3", whole=["a"]) == [{"a": 5}, {"a": 13}, {"a": 20}]
-    assert points("grid", "a=1:100:3:log", whole=["a"]) == [{"a": 1}, {"a": 10}, {"a": 100}]
+    assert points("grid", "a=5:20:3", integers=["a"]) == [{"a": 5}, {"a": 13}, {"a": 20}]
+    assert points("grid", "a=1:100:3:log", integers=["a"]) == [{"a": 1}, {"a": 10}, {"a": 100}]
 
 
 @given(st.integers(1, 40), st.integers(0, 9))
 def test_latin_hypercube_has_one_value_in_each_slice_of_a_range(count, seed):
-    found = points("latin", "a=0:1", "b=-5:5", count=count, seed=seed)
+    rows = points("latin", "a=0:1", "b=-5:5", count=count, seed=seed)
     for path, low, width in (("a", 0, 1), ("b", -5, 10)):
-        slices = [int((point[path] - low) / width * count) for point in found]
+        slices = [int((point[path] - low) / width * count) for point in rows]
         assert sorted(slices) == list(range(count))
 
 
 @given(st.sampled_from(["random", "latin"]), st.integers(0, 5))
 def test_drawn_points_lie_within_their_ranges_and_depend_on_the_seed_alone(kind, seed):
-    asked = ("a=-1:2", "b=1:1000:log", "n=3:7", "w=x,y")
-    found = points(kind, *asked, count=60, seed=seed, whole=["n"])
-    assert found == points(kind, *asked, count=60, seed=seed, whole=["n"])
-    assert found != points(kind, *asked, count=60, seed=seed + 1, whole=["n"])
-    assert all(-1 <= point["a"] <= 2 and 1 <= point["b"] <= 1000 for point in found)
-    assert {type(point["n"]) for point in found} == {int}
-    assert {point["n"] for point in found} == {3, 4, 5, 6, 7}
-    assert {point["w"] for point in found} == {"x", "y"}
+    texts = ("a=-1:2", "b=1:1000:log", "n=3:7", "w=x,y")
+    rows = points(kind, *texts, count=60, seed=seed, integers=["n"])
+    assert rows == points(kind, *texts, count=60, seed=seed, integers=["n"])
+    assert rows != points(kind, *texts, count=60, seed=seed + 1, integers=["n"])
+    assert all(-1 <= point["a"] <= 2 and 1 <= point["b"] <= 1000 for point in rows)
+    assert {type(point["n"]) for point in rows} == {int}
+    assert {point["n"] for point in rows} == {3, 4, 5, 6, 7}
+    assert {point["w"] for point in rows} == {"x", "y"}
 
 
 def test_random_draws_of_a_path_do_not_depend_on_what_else_varies():
@@ -127,7 +127,7 @@ def test_random_draws_are_uniform_also_in_equal_ratios():
 
 
 @pytest.mark.parametrize(
-    ("kind", "texts", "count", "told"),
+    ("kind", "texts", "count", "message"),
     [
         ("gird", ["a=1,2"], None, "design: .*grid"),
         ("grid", ["a=0:1"], None, "--vary a=0:1: expected FIRST:LAST:COUNT"),
@@ -146,13 +146,13 @@ def test_random_draws_are_uniform_also_in_equal_ratios():
         ("latin", ["a=0:1:5"], 5, "--vary a=0:1:5: .*without COUNT"),
     ],
 )
-def test_design_that_cannot_be_is_refused(kind, texts, count, told):
-    with pytest.raises(BadInput, match=f"^{told}"):
-        points(kind, *texts, count=count, whole=["n"])
+def test_design_that_cannot_be_is_refused(kind, texts, count, message):
+    with pytest.raises(BadInput, match=f"^{message}"):
+        points(kind, *texts, count=count, integers=["n"])
 
 
-def plan(scenario, *texts, **asked):
-    return plan_of(SweepSpec(scenario, (1, 2), tuple(vary_of(text) for text in texts), **asked))
+def plan(scenario, *texts, **options):
+    return plan_of(SweepSpec(scenario, (1, 2), tuple(vary_of(text) for text in texts), **options))
 
 
 def test_range_over_integer_keys_of_a_scenario_gives_integers(scenario):
@@ -164,33 +164,35 @@ def test_range_over_integer_keys_of_a_scenario_gives_integers(scenario):
         'robots.pair.agent="counting.py:Counting"',
         'events=[{at_s=0.1, do="kill", robots={group="pair", count=1}}]',
     )
-    found = plan(
+    campaign = plan(
         scenario, "robots.pair.count=2:8:2", "robots.pair.params.n=1:3:2", "robots.pair.params.x=1:3:2",
         "time.rate_hz=10:20:2", "duration_s=1:2:2", "events.0.robots.count=1:2:2", overrides=agent,
     )  # fmt: skip
-    assert [type(value) for value in found.points[0].values()] == [int, int, float, int, float, int]
-    assert len(found.points) == 64
+    assert [type(value) for value in campaign.points[0].values()] == [int, int, float, int, float, int]
+    assert len(campaign.points) == 64
 
 
 def test_responses_are_told_with_unit_and_kind(scenario):
-    found = {of.column: of for of in plan(scenario).responses}
-    assert found["min_gap.final"].unit == "m"
-    assert {of.kind for of in found.values()} == {"number"}
-    assert list(found)[:4] == ["order.final", "order.mean", "order.min", "order.max"]
-    assert "radio.link_pdr" in found
+    responses = {response.column: response for response in plan(scenario).responses}
+    assert responses["min_gap.final"].unit == "m"
+    assert {response.kind for response in responses.values()} == {"number"}
+    assert list(responses)[:4] == ["order.final", "order.mean", "order.min", "order.max"]
+    assert "radio.link_pdr" in responses
 
 
 def test_stop_time_response_names_its_condition_and_hold_time(scenario):
     stop = 'stop={metric="order", at_least=0.5, hold_s=%s}'
-    (held,) = (of for of in plan(scenario, overrides=(stop % 2.0,)).responses if of.column == "stop_time_s")
+    (held,) = (
+        response for response in plan(scenario, overrides=(stop % 2.0,)).responses if response.column == "stop_time_s"
+    )
     assert (held.help, held.hold_s) == ("when this began to hold: order at least 0.5 for 2 s", 2.0)
     varied = plan(scenario, "stop.hold_s=1.0,3.0", overrides=(stop % 2.0,)).responses
-    (held,) = (of for of in varied if of.column == "stop_time_s")
+    (held,) = (response for response in varied if response.column == "stop_time_s")
     assert (held.help, held.hold_s) == ("when this began to hold: the stop condition", 3.0)
 
 
 @pytest.mark.parametrize(
-    ("texts", "told"),
+    ("texts", "message"),
     [
         (["radio.losss=0,0.5"], r"--vary radio.losss=0,0.5: radio.losss: unknown key; .*loss \(did you mean this"),
         (["robots.pair.params.sepa=1,2"], r"--vary robots.pair.params.sepa=1,2: .*sepa: "),
@@ -203,8 +205,8 @@ def test_stop_time_response_names_its_condition_and_hold_time(scenario):
         (["seed=1,2"], r"--vary seed=1,2: "),
     ],
 )  # fmt: skip
-def test_point_that_cannot_be_run_is_refused_with_what_varies(scenario, texts, told):
-    with refused_input(match=f"^{told}"):
+def test_point_that_cannot_be_run_is_refused_with_what_varies(scenario, texts, message):
+    with refused_input(match=f"^{message}"):
         plan(scenario, *texts)
 
 

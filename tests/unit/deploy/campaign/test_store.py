@@ -36,9 +36,9 @@ CAMPAIGN = Campaign(
 )
 
 
-def row(run, **of):
+def row(run, **values):
     ends = {"ended": "duration", "ticks": 200, "sim_time_s": 20.0}
-    return {"run": run, "point": run // 2, "seed": CAMPAIGN.seeds[run % 2], **ends, **of}
+    return {"run": run, "point": run // 2, "seed": CAMPAIGN.seeds[run % 2], **ends, **values}
 
 
 @pytest.fixture
@@ -46,8 +46,8 @@ def written(tmp_path):
     """Two tasks of a campaign: a run that found nothing, one that failed, one that faulted; the last is missing."""
     write_campaign(CAMPAIGN, tmp_path)
     folder = CampaignWriter(tmp_path, CAMPAIGN)
-    found = row(1, **{"order.final": 0.9, "found_s": 7.5})
-    folder.write(TaskResult((row(0, **{"order.final": 0.5, "counts.late_answers": 3}), found)))
+    last = row(1, **{"order.final": 0.9, "found_s": 7.5})
+    folder.write(TaskResult((row(0, **{"order.final": 0.5, "counts.late_answers": 3}), last)))
     folder.write(TaskResult((row(2, ended="failed", error="the agent failed"),)))
     return folder
 

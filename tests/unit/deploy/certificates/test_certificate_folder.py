@@ -74,7 +74,10 @@ def test_revoked_name_is_listed_and_never_issued_again(folder: Path, clock: Date
     revoke(folder, "flock-0", clock)
     register = Register.read(folder)
     assert register.revoked() == ["flock-0"]
-    assert [of.name for of in register.certificates if of.revoked is not None] == ["flock-0", "flock-0"]
+    assert [certificate.name for certificate in register.certificates if certificate.revoked is not None] == [
+        "flock-0",
+        "flock-0",
+    ]
     clock.pass_days(400)  # nor when all its certificates have ended
     assert "flock-0 is revoked" in refusal(folder, clock, "flock-2", "flock-0")
 
@@ -185,7 +188,7 @@ def test_certificate_is_for_server_and_client_with_name_and_hosts(folder: Path, 
     leaf.verify_directly_issued_by(certificate(folder, "ca"))
     names = leaf.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     purposes = leaf.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value
-    assert [of.value for of in leaf.subject.get_attributes_for_oid(NameOID.COMMON_NAME)] == ["flock-0"]
+    assert [attribute.value for attribute in leaf.subject.get_attributes_for_oid(NameOID.COMMON_NAME)] == ["flock-0"]
     assert names.get_values_for_type(x509.DNSName) == ["flock-0", "pi.local"]
     assert names.get_values_for_type(x509.IPAddress) == [ip_address("10.0.0.5"), ip_address("fe80::1")]
     assert set(purposes) == {ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH}
@@ -231,8 +234,8 @@ def test_rights_follow_the_purposes_of_certificates(registered, clock):
 
 @pytest.mark.parametrize("role", ["runners", "observers", "operators", "routers"])
 def test_revoked_name_has_no_rights(role: str):
-    left = RunAccess(**{role: ("kept", "gone")}, revoked=("gone",)).without_revoked()
-    assert getattr(left, role) == ("kept",)
+    access = RunAccess(**{role: ("kept", "gone")}, revoked=("gone",)).without_revoked()
+    assert getattr(access, role) == ("kept",)
 
 
 def test_purpose_of_a_name_is_the_last_and_survives_renewal(registered, clock):

@@ -61,7 +61,11 @@ def test_certs_commands_create_issue_revoke_and_list(certs: Certs):
         ("flock-0", "robot", "valid"),
         ("flock-1", "robot", "revoked"),
     ]
-    assert [of["state"] for of in json.loads(certs("list", "--json")[0])] == ["valid", "valid", "revoked"]
+    assert [certificate["state"] for certificate in json.loads(certs("list", "--json")[0])] == [
+        "valid",
+        "valid",
+        "revoked",
+    ]
 
 
 def test_certs_list_warns_of_certificates_that_end_soon(certs: Certs):
@@ -175,6 +179,6 @@ def test_register_is_needed_by_members_that_listen_alone(certified, tmp_path):
 def test_contradictory_options_of_a_member_are_refused(certified):
     only_with_certs = {"name": "world"}, {"access": RunAccess(("a",))}, {"revoked": ("a",)}, {"certs": Path("none")}
     not_beside_a_register = {"insecure": True}, {"access": RunAccess(("b",))}
-    for options in (*only_with_certs, *({"certs": certified, **of} for of in not_beside_a_register)):
+    for options in (*only_with_certs, *({"certs": certified, **extra} for extra in not_beside_a_register)):
         with refused_input():
             member("world", **options)

@@ -42,17 +42,17 @@ def announced(folder, run, pid=None):
     """A run that is announced, as far as files go."""
     folder.mkdir()
     write_live(Live("unixsock-stream//nowhere", run, pid or os.getpid()), folder)
-    found = Announcement(folder)
-    found.begin(static(2))
-    return found
+    announcement = Announcement(folder)
+    announcement.begin(static(2))
+    return announcement
 
 
 def test_run_is_found_until_it_ends(tmp_path, runtime):
     assert live_runs() == []
     run = announced(tmp_path / "a", "r1")
-    [found] = live_runs()
-    assert found == LiveRun("unixsock-stream//nowhere", "r1", os.getpid(), static(2).name, str(tmp_path / "a"))
-    assert find_run(None) == find_run("r1") == find_run("r") == found
+    [live] = live_runs()
+    assert live == LiveRun("unixsock-stream//nowhere", "r1", os.getpid(), static(2).name, str(tmp_path / "a"))
+    assert find_run(None) == find_run("r1") == find_run("r") == live
     assert find_run(str(tmp_path / "a")).run == "r1"
     assert run.end(None) == {}
     assert live_runs() == []
@@ -209,7 +209,7 @@ def ctl(*arguments: object) -> str:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "place"),
+    ("arguments", "where"),
     [
         (["kill", "3", "4"], "ROBOTS"),
         (["kill", "3x"], "ROBOTS"),
@@ -227,18 +227,18 @@ def ctl(*arguments: object) -> str:
         (["--endpoint", "tcp/192.0.2.1:7447", "pause"], "beyond this machine"),
     ],
 )
-def test_faults_are_told_in_one_line(going_run, arguments, place):
+def test_faults_are_told_in_one_line(going_run, arguments, where):
     with pytest.raises(SwarmwireError, match="^[^\n]*$") as caught:
         ctl(*arguments)
-    assert place in str(caught.value)
+    assert where in str(caught.value)
 
 
 @pytest.fixture
 def going_run(tmp_path):
     """A run of this process that is announced as those of the command line are."""
-    with going(tmp_path / "run", "duration_s=1", observers=[Announcement(tmp_path / "run")]) as found:
+    with going(tmp_path / "run", "duration_s=1", observers=[Announcement(tmp_path / "run")]) as run:
         until(lambda: list((tmp_path / "swarmwire").glob("*.json")))
-        yield found
+        yield run
 
 
 def test_misspelt_command_is_refused_with_the_right_one():

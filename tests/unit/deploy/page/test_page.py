@@ -67,10 +67,10 @@ def test_without_the_token_everything_is_refused(client, path):
 
 def test_request_without_a_path_is_refused(control, news):
     with serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address:
-        asked = http.client.HTTPConnection(urlsplit(address).netloc, timeout=10)
-        with contextlib.closing(asked):
-            asked.request("OPTIONS", "*")
-            assert asked.getresponse().status == 403
+        connection = http.client.HTTPConnection(urlsplit(address).netloc, timeout=10)
+        with contextlib.closing(connection):
+            connection.request("OPTIONS", "*")
+            assert connection.getresponse().status == 403
 
 
 def test_page_address_without_its_last_slash_is_redirected(client):
@@ -114,7 +114,7 @@ def test_answer_headers_forbid_foreign_content_and_embedding(client):
 
 
 @pytest.mark.parametrize(
-    ("order", "asked"),
+    ("order", "call"),
     [
         ({"do": "pause"}, ("pause", None)),
         ({"do": "resume"}, ("resume", None)),
@@ -125,10 +125,10 @@ def test_answer_headers_forbid_foreign_content_and_embedding(client):
         ({"do": "end", "number": 3}, ("end", 3)),
     ],
 )
-def test_orders_reach_the_run(client, control, order, asked):
+def test_orders_reach_the_run(client, control, order, call):
     answer = client.post("/secret/do", json=order)
     assert (answer.status_code, answer.json()) == (200, {"event": None})
-    assert control.asked == [asked]
+    assert control.asked == [call]
 
 
 def test_event_is_passed_on_unchanged_and_answered_with_its_number(client, control):
@@ -190,9 +190,9 @@ def test_status_joins_the_last_answer_of_the_run_and_what_was_seen(client, contr
     until(lambda: client.get("/secret/status").json().get("tick") == 0)
     control.tick = 3
     news.look()
-    told = until(lambda: client.get("/secret/status").json(), lambda told: told["tick"] == 3)
-    assert told["link_pdr"] == 0.25
-    assert told["metrics"] == {"order": 0.5, "rejoin_median": None}
+    answer = until(lambda: client.get("/secret/status").json(), lambda answer: answer["tick"] == 3)
+    assert answer["link_pdr"] == 0.25
+    assert answer["metrics"] == {"order": 0.5, "rejoin_median": None}
 
 
 def test_values_are_kept_for_pages_that_are_opened_later_one_a_tick(control, news):
@@ -224,13 +224,13 @@ def test_news_reach_a_page_until_the_run_is_gone(control, news):
         assert address.startswith("http://127.0.0.1:")
         news.start()
         with urllib.request.urlopen(f"{address}news", timeout=20) as answer:
-            told = events(answer)
-            name, facts = next(told)
+            stream = events(answer)
+            name, facts = next(stream)
             assert (name, facts["name"], facts["viewer"]) == ("facts", "a flock", SHOWN.viewer)
-            name, status = next(told)
+            name, status = next(stream)
             assert (name, status["state"]) == ("status", "running")
             control.gone = True
-            over = next(status for _, status in told if status["state"] == "over")
+            over = next(status for _, status in stream if status["state"] == "over")
             assert (over["tick"], over["gone"]) == (0, "nobody answers")
     with pytest.raises(urllib.error.URLError):
         urllib.request.urlopen(address, timeout=5)
@@ -240,8 +240,8 @@ def test_frozen_run_is_silent_until_it_answers_again(control):
     news = NewsThread(control, dict, WallClock(), over=lambda: False)
     with contextlib.closing(news):
         news.start()
-        for gone, state in ((False, "running"), (True, "silent"), (False, "running")):
-            control.gone = gone
+        for frozen, state in ((False, "running"), (True, "silent"), (False, "running")):
+            control.gone = frozen
             until(lambda state=state: news.latest.get("state") == state)
 
 
@@ -267,10 +267,10 @@ def test_news_end_for_every_page_when_the_server_ends(control, news):
     with serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address:
         news.start()
         answer = urllib.request.urlopen(f"{address}news", timeout=20)
-        told = events(answer)
-        assert [next(told)[0], next(told)[0]] == ["facts", "status"]
+        stream = events(answer)
+        assert [next(stream)[0], next(stream)[0]] == ["facts", "status"]
         news.close()
-        assert [status for _, status in told if status["state"] != "running"] == []  # it ends
+        assert [status for _, status in stream if status["state"] != "running"] == []  # it ends
         answer.close()
 
 
@@ -280,9 +280,9 @@ def test_departure_is_that_of_the_last_browser_after_there_was_one():
 
     def looks(open_pages, for_s):
         readers[0] = open_pages
-        seen = [departed()]
+        counts = [departed()]
         clock.time_ns += round(for_s * 1e9)
-        return [*seen, departed()]
+        return [*counts, departed()]
 
     assert looks(0, 1000) == [False, False]  # nobody has opened it yet
     assert looks(2, 1000) == [False, False]
@@ -299,8 +299,8 @@ def test_pages_that_are_open_are_counted_also_after_the_end(control, news):
         news.start()
         with urllib.request.urlopen(f"{address}news", timeout=20) as answer:
             control.gone = True
-            told = events(answer)
-            next(status for _, status in told if status.get("state") == "over")
+            stream = events(answer)
+            next(status for _, status in stream if status.get("state") == "over")
             assert news.readers == 1
         until(lambda: news.readers == 0)
 
@@ -313,24 +313,24 @@ def test_speed_is_unknown_while_kernels_are_compiled(control, news):
 
 
 def test_token_differs_for_each_page():
-    taken = []
+    calls = []
 
     def app(token, port):
-        taken.append((token, port))
+        calls.append((token, port))
 
     for _ in range(2):
         with serving(app, WallClock()) as address:
-            token, port = taken[-1]
+            token, port = calls[-1]
             assert address == f"http://127.0.0.1:{port}/{token}/"
             assert len(token) >= 32
-    assert taken[0][0] != taken[1][0]
+    assert calls[0][0] != calls[1][0]
 
 
-OF, NINE = static(robots=4), static(robots=9)
+FOUR, NINE = static(robots=4), static(robots=9)
 
 
-def glimpse(tick=0, of=OF, **given):
-    return ObservedTick(truth(of, tick, **given), serial=tick, ticks=1, values=np.zeros((0, 1)))
+def glimpse(tick=0, swarm=FOUR, **fields):
+    return ObservedTick(truth(swarm, tick, **fields), serial=tick, ticks=1, values=np.zeros((0, 1)))
 
 
 def happened(changed, ended=False, serial=2):
@@ -340,37 +340,37 @@ def happened(changed, ended=False, serial=2):
 
 
 def test_centre_is_that_of_the_robots_alive():
-    seen = TickNumbers(OF)
-    assert seen.numbers["centre"] is None
+    tick_numbers = TickNumbers(FOUR)
+    assert tick_numbers.numbers["centre"] is None
     pose = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 4.0, 0.0], [9.0, 9.0, 0.0]])
-    seen.see(glimpse(pose=pose, alive=np.array([True, True, True, False])))
-    assert seen.numbers["centre"] == pytest.approx([4 / 3, 4 / 3], abs=1e-3)
-    assert seen.numbers["places"] == [[0, 0, True], [2, 0, True], [2, 4, True], [9, 9, False]]
-    seen.see(glimpse(pose=pose, alive=np.zeros(4, np.bool_)))
-    assert seen.numbers["centre"] is None
+    tick_numbers.see(glimpse(pose=pose, alive=np.array([True, True, True, False])))
+    assert tick_numbers.numbers["centre"] == pytest.approx([4 / 3, 4 / 3], abs=1e-3)
+    assert tick_numbers.numbers["places"] == [[0, 0, True], [2, 0, True], [2, 4, True], [9, 9, False]]
+    tick_numbers.see(glimpse(pose=pose, alive=np.zeros(4, np.bool_)))
+    assert tick_numbers.numbers["centre"] is None
 
 
 def test_positions_shown_of_a_large_swarm_are_limited():
     large = static(robots=3 * MAX_POSITIONS)
-    seen = TickNumbers(large)
-    seen.see(glimpse(of=large))
-    assert len(seen.numbers["places"]) == MAX_POSITIONS
+    tick_numbers = TickNumbers(large)
+    tick_numbers.see(glimpse(swarm=large))
+    assert len(tick_numbers.numbers["places"]) == MAX_POSITIONS
 
 
 def test_delivery_is_that_of_the_last_simulated_second():
-    seen = TickNumbers(OF)
-    seen.see(glimpse(0, tally=tally({Fate.RECEIVED: 1, Fate.LOST: 1})))
-    assert seen.numbers["link_pdr"] == 0.5
-    seen.see(glimpse(5, tally=tally({Fate.RECEIVED: 2})))
-    assert seen.numbers["link_pdr"] == 0.75
-    seen.see(glimpse(10, tally=tally({Fate.LOST: 2})))
-    assert seen.numbers["link_pdr"] == 0.5
-    seen.see(glimpse(30, tally=None))
-    assert seen.numbers["link_pdr"] is None
+    tick_numbers = TickNumbers(FOUR)
+    tick_numbers.see(glimpse(0, tally=tally({Fate.RECEIVED: 1, Fate.LOST: 1})))
+    assert tick_numbers.numbers["link_pdr"] == 0.5
+    tick_numbers.see(glimpse(5, tally=tally({Fate.RECEIVED: 2})))
+    assert tick_numbers.numbers["link_pdr"] == 0.75
+    tick_numbers.see(glimpse(10, tally=tally({Fate.LOST: 2})))
+    assert tick_numbers.numbers["link_pdr"] == 0.5
+    tick_numbers.see(glimpse(30, tally=None))
+    assert tick_numbers.numbers["link_pdr"] is None
 
 
 @pytest.mark.parametrize(
-    ("robots", "told"),
+    ("robots", "names"),
     [
         ((), "none"),
         ((1, 3), "flock-1, flock-3"),
@@ -378,15 +378,15 @@ def test_delivery_is_that_of_the_last_simulated_second():
         (range(1, 9), "flock-1, flock-2, flock-3, flock-4, flock-5 and 3 more"),
     ],
 )
-def test_events_say_whom_they_changed_when_they_began(robots, told):
-    seen = TickNumbers(NINE)
-    seen.see(glimpse(0, NINE, events=(happened(robots),)))
-    seen.see(glimpse(1, NINE, events=(happened([0], ended=True),)))
-    assert seen.numbers["who"] == {"2": told}
+def test_events_say_whom_they_changed_when_they_began(robots, names):
+    tick_numbers = TickNumbers(NINE)
+    tick_numbers.see(glimpse(0, NINE, events=(happened(robots),)))
+    tick_numbers.see(glimpse(1, NINE, events=(happened([0], ended=True),)))
+    assert tick_numbers.numbers["who"] == {"2": names}
 
 
 def test_events_kept_are_the_newest():
-    seen = TickNumbers(NINE)
+    tick_numbers = TickNumbers(NINE)
     for tick in range(MAX_EVENTS + 10):
-        seen.see(glimpse(tick, NINE, events=(happened([0], serial=tick),)))
-    assert list(seen.numbers["who"]) == [str(tick) for tick in range(10, MAX_EVENTS + 10)]
+        tick_numbers.see(glimpse(tick, NINE, events=(happened([0], serial=tick),)))
+    assert list(tick_numbers.numbers["who"]) == [str(tick) for tick in range(10, MAX_EVENTS + 10)]

@@ -104,7 +104,7 @@ def test_poses_within_a_tick_decide_fates_also_in_a_repetition(tmp_path: Path) -
         assert inputs is not None
         return ReplayedBackend(Approaching(source, clock, pace), inputs, 2, RATE_HZ, world.set_first_poses)
 
-    loops, seen = list[Loop](), list[Fates]()
+    loops, results = list[Loop](), list[Fates]()
     for make in (follow, replay):
         world, fates = World(scenario, [1], {}), Fates()
         backend = make(world)
@@ -112,8 +112,11 @@ def test_poses_within_a_tick_decide_fates_also_in_a_repetition(tmp_path: Path) -
         backend.start()
         loop.run(4)
         loops.append(loop)
-        seen.append(fates)
-    assert seen[0].x_m == [FAR_M] * 4  # before each tick
-    assert seen[0].fates[[Fate.RECEIVED, Fate.OUT_OF_RANGE]].tolist() == [3, 6]  # of three ticks; the fourth ends later
-    assert seen[1].fates.tolist() == seen[0].fates.tolist()
+        results.append(fates)
+    assert results[0].x_m == [FAR_M] * 4  # before each tick
+    assert results[0].fates[[Fate.RECEIVED, Fate.OUT_OF_RANGE]].tolist() == [
+        3,
+        6,
+    ]  # of three ticks; the fourth ends later
+    assert results[1].fates.tolist() == results[0].fates.tolist()
     assert loops[1].hexdigests() == loops[0].hexdigests()

@@ -31,18 +31,18 @@ DURATION_S, RATE_HZ = 8, 10
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     """A run of a flock in which a fifth dies after 4 s: its recording, its result and its ticks."""
-    out, seen = tmp_path_factory.mktemp("runs") / "run", Watcher()
+    out, watcher = tmp_path_factory.mktemp("runs") / "run", Watcher()
     event = 'events=[{at_s=4.0,do="kill",robots={group="flock",share=0.2}}]'
-    result = run(LOSSY, overrides=[f"duration_s={DURATION_S}", event], out=out, observers=[seen])
-    return out / "run.rrd", result, seen.truths
+    result = run(LOSSY, overrides=[f"duration_s={DURATION_S}", event], out=out, observers=[watcher])
+    return out / "run.rrd", result, watcher.truths
 
 
 def test_positions_and_who_is_dead_are_the_runs(recorded):
     rrd, _, ticks = recorded
     positions = column(rrd, "/world/robots", "Points2D:positions")
     assert list(positions) == list(range(DURATION_S * RATE_HZ))
-    for seen in ticks:
-        assert positions[seen.tick] == seen.pose[:, :2].astype(np.float32).tolist()
+    for moment in ticks:
+        assert positions[moment.tick] == moment.pose[:, :2].astype(np.float32).tolist()
     names, classes = class_names(rrd), column(rrd, "/world/robots", "Points2D:class_ids")
     dead = {tick: sum(names[one][0] == "dead" for one in row) for tick, row in classes.items()}
     assert dead == {0: 0, 40: 4}
@@ -54,7 +54,9 @@ def test_fates_are_the_runs_own_tally(recorded):
     seconds = range(RATE_HZ - 1, len(ticks), RATE_HZ)  # each shows the second that ends with it
     for name, values in drawn.items():
         fate = FATE_NAMES.index(name.replace(" ", "_"))
-        assert sum(values.get(tick, 0.0) for tick in seconds) == sum(int(seen.tally.fates[0, fate]) for seen in ticks)
+        assert sum(values.get(tick, 0.0) for tick in seconds) == sum(
+            int(moment.tally.fates[0, fate]) for moment in ticks
+        )
     received = sum(drawn["received"][tick] for tick in seconds)
     assert received == result.radio.fates["received"]
     listed = {name for name, count in result.radio.fates.items() if count and name not in ("in_flight", "out_of_range")}
@@ -64,15 +66,15 @@ def test_fates_are_the_runs_own_tally(recorded):
 def test_lines_of_lost_packets_are_those_that_the_radio_finished(recorded):
     rrd, _, ticks = recorded
     lines = column(rrd, "/world/lost_packets", "LineStrips2D:strips")
-    for seen in ticks:
-        unheard = (seen.finished.fate != Fate.RECEIVED) & (seen.finished.receiver >= 0)
-        assert len(lines.get(seen.tick, [])) == unheard.sum()
+    for moment in ticks:
+        unheard = (moment.finished.fate != Fate.RECEIVED) & (moment.finished.receiver >= 0)
+        assert len(lines.get(moment.tick, [])) == unheard.sum()
     assert any(lines.values())
 
 
 def test_metrics_end_where_the_summary_says(recorded):
     rrd, result, ticks = recorded
-    drawn = {name: of for plot in ("shares", "distances", "numbers") for name, of in series(rrd, plot).items()}
+    drawn = {name: values for plot in ("shares", "distances", "numbers") for name, values in series(rrd, plot).items()}
     for name in ("order", "components", "collisions", "min_gap", "largest_component"):
         assert drawn[name][len(ticks) - 1] == pytest.approx(result.metrics[name].final)
     order = list(drawn["order"].values())
@@ -82,8 +84,8 @@ def test_metrics_end_where_the_summary_says(recorded):
 def test_events_name_the_robots_of_the_summary(recorded):
     rrd, result, _ = recorded
     [event] = result.events
-    told = column(rrd, "/events", "TextLog:text")
-    assert told[event.tick] == [f"kill: {', '.join(event.robots[0])}"]
+    lines = column(rrd, "/events", "TextLog:text")
+    assert lines[event.tick] == [f"kill: {', '.join(event.robots[0])}"]
 
 
 RUNS = 4
@@ -100,9 +102,9 @@ def test_empty_folder_found_by_several_runs_goes_to_one(tmp_path, monkeypatch, e
         folder.mkdir()
 
     def look(path):
-        found = list(looks(path))
+        results = list(looks(path))
         all_have_looked.wait(20)
-        return iter(found)
+        return iter(results)
 
     monkeypatch.setattr(Path, "iterdir", look)
     with ThreadPoolExecutor(RUNS) as runs:

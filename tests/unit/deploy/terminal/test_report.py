@@ -62,14 +62,14 @@ def test_packets_row_excludes_robots_behind_obstacles_from_range(result):
     radio = result.radio
     assert radio is not None
     fates = dict.fromkeys(FATE_NAMES, 0) | {"received": 60, "lost": 20, "out_of_range": 10}
-    told = replace(radio, sent=10, intended=100, in_range=80, pdr=0.6, link_pdr=0.75, fates=fates)
-    text = shown(result, radio=told)
+    account = replace(radio, sent=10, intended=100, in_range=80, pdr=0.6, link_pdr=0.75, fates=fates)
+    text = shown(result, radio=account)
     assert row(text, "packets") == "10 sent, 100 intended receivers, 80 in range"
     assert row(text, "pdr") == "60.0% (received / intended)"
     assert row(text, "link_pdr") == "75.0% (received / in range)"
-    told = replace(told, fates=fates | {"blocked": 10})
-    assert row(shown(result, radio=told), "packets").endswith("80 in range and sight")
-    alone = shown(result, radio=replace(told, sent=1, intended=19, in_range=0, pdr=0.0, link_pdr=None))
+    account = replace(account, fates=fates | {"blocked": 10})
+    assert row(shown(result, radio=account), "packets").endswith("80 in range and sight")
+    alone = shown(result, radio=replace(account, sent=1, intended=19, in_range=0, pdr=0.0, link_pdr=None))
     assert row(alone, "pdr") == "0.0% (received / intended)"
     assert "link_pdr" not in alone
 
@@ -78,15 +78,15 @@ def test_arenas_that_stopped_are_told_with_when_and_by_what_and_those_that_did_n
     early, late = "order at least 0.9 for 5 s", "target_best below 0.1"
     [arena] = result.arenas
     stopped = {3: (early, 1.5), 5: (late, 0.0)}
-    of = [
+    arenas = [
         replace(
             arena, seed=seed, stopped_by=stopped.get(seed, (None, None))[0], stop_time_s=stopped.get(seed, (0, None))[1]
         )
         for seed in range(1, 11)
     ]
     out = StringIO()
-    told = replace(result, arenas=tuple(of), stop=(early, late), ended="duration")
-    print_result(told, METRICS.values(), Console(file=out, width=160, color_system=None))
+    run = replace(result, arenas=tuple(arenas), stop=(early, late), ended="duration")
+    print_result(run, METRICS.values(), Console(file=out, width=160, color_system=None))
     rows = [line for line in out.getvalue().splitlines() if "stopped" in line]
     assert [" ".join(row.split()) for row in rows] == [
         f"stopped {early}: seed 3 since 1.5 s",

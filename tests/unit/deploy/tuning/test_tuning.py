@@ -14,15 +14,15 @@ from swarmwire.metrics.records.campaign.campaign_json import Response
 from tests.support.refusals import refused_input
 
 
-def search(text, whole=False):
-    return search_from(search_of(text), lambda _: whole)
+def search(text, integer=False):
+    return search_from(search_of(text), lambda _: integer)
 
 
 def test_search_range_has_integers_for_integer_keys():
     assert search("radio.loss=0:0.8") == Search("radio.loss", 0.0, 0.8)
     assert search("a.b=1:100:log") == Search("a.b", 1.0, 100.0, log=True)
-    assert search("a=2:9.6", whole=True) == Search("a", 2.0, 10.0, whole=True)
-    assert search("a=2:9", whole=True).trials == (2, 9)
+    assert search("a=2:9.6", integer=True) == Search("a", 2.0, 10.0, whole=True)
+    assert search("a=2:9", integer=True).trials == (2, 9)
     assert search("a=0.02:0.2").override(0.1) == "a=0.1"
 
 
@@ -42,9 +42,9 @@ def test_value_at_the_end_of_its_range_is_recognised(text, value, end):
 
 
 def test_choices_are_toml_values_known_by_their_texts():
-    found = search("a=[4.0, 4.0],[8.0, 8.0]")
-    assert found.names == ("[4.0, 4.0]", "[8.0, 8.0]")
-    assert found.value("[8.0, 8.0]") == [8.0, 8.0]
+    variation = search("a=[4.0, 4.0],[8.0, 8.0]")
+    assert variation.names == ("[4.0, 4.0]", "[8.0, 8.0]")
+    assert variation.value("[8.0, 8.0]") == [8.0, 8.0]
     assert search("a=discs,pymunk").value("pymunk") == "pymunk"
     assert search("a=0.5,2,true").choices == (0.5, 2, True)
 
@@ -64,7 +64,7 @@ def test_search_text_that_is_no_range_is_refused(text):
 @pytest.mark.parametrize("text", ["a=1.1:1.2", "a=0.2:3:log"])
 def test_search_range_without_integers_for_an_integer_key_is_refused(text):
     with refused_input(f"--search {text}", match="expected LOW"):
-        search(text, whole=True)
+        search(text, integer=True)
 
 
 def test_fresh_seeds_are_none_of_those_used():
@@ -82,9 +82,9 @@ LIMIT_S = 60.0
 
 
 def reached(goal, values, end_s=LIMIT_S):
-    found = goal_of(goal, (ORDER, TIME), LIMIT_S)
-    rows = [{"seed": seed, "sim_time_s": end_s, found.response.column: value} for seed, value in enumerate(values)]
-    return found.reached(sample_of(rows, found.response))
+    parsed = goal_of(goal, (ORDER, TIME), LIMIT_S)
+    rows = [{"seed": seed, "sim_time_s": end_s, parsed.response.column: value} for seed, value in enumerate(values)]
+    return parsed.reached(sample_of(rows, parsed.response))
 
 
 @pytest.mark.parametrize(
@@ -106,10 +106,10 @@ def test_goal_over_times_is_kaplan_meier_with_mean_up_to_the_limit():
 def test_goal_quantile_not_reached_grows_with_censored_runs():
     values = []
     for missing in range(6):
-        found = reached("min aggregation_time_s.q50", [59.0] * (5 - missing) + [None] * missing)
-        assert math.isnan(found.statistic) == (missing >= 3)
-        assert found.censored == pytest.approx(missing / 5)
-        values.append(found.value)
+        value = reached("min aggregation_time_s.q50", [59.0] * (5 - missing) + [None] * missing)
+        assert math.isnan(value.statistic) == (missing >= 3)
+        assert value.censored == pytest.approx(missing / 5)
+        values.append(value.value)
     assert values == pytest.approx([59.0, 59.0, 59.0, 96.0, 108.0, 120.0])
 
 

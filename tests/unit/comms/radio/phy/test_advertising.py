@@ -63,7 +63,7 @@ def scanned(robots: int, start_ns: IntArray, window_ns: int) -> BoolArray:
 def receptions(robots: int, senders: int, ticks: int, window_ns: int = INTERVAL_NS) -> set[tuple[int, int, int, int]]:
     """Sequence, sender, receiver and time of all that is received: the first PDU that a scanner hears alone."""
     start_ns = starts_ns(senders, ticks)
-    heard = scanned(robots, start_ns, window_ns)
+    packets = scanned(robots, start_ns, window_ns)
     expected = set[tuple[int, int, int, int]]()
     for tick, sender, receiver in np.ndindex(ticks, senders, robots):
         for pdu in PDUS if sender != receiver else ():
@@ -75,7 +75,7 @@ def receptions(robots: int, senders: int, ticks: int, window_ns: int = INTERVAL_
                 event = start_ns[tick, receiver]
                 if event[0] < at_ns + AIRTIME_NS and at_ns < event[2] + AIRTIME_NS:
                     continue
-            if heard[tick, sender, pdu, receiver] and not others.any():
+            if packets[tick, sender, pdu, receiver] and not others.any():
                 expected.add((tick, sender, receiver, int(at_ns) + AIRTIME_NS))
                 break
     return expected
@@ -168,7 +168,7 @@ def test_arenas_do_not_interact():
     pose = np.concatenate([scattered(robots, seed) for seed in (5, 6)])
     both = run(make_medium(radio, robots, seeds=(1, 2)), pose, everybody(2 * robots), 4, 1)
     second = run(make_medium(radio, robots, seeds=(2,)), pose[robots:], everybody(robots), 4, 1)
-    in_second = [(*rest, receiver - robots, at) for *rest, receiver, at in received(both) if receiver >= robots]
+    in_second = [(*fields, receiver - robots, at) for *fields, receiver, at in received(both) if receiver >= robots]
     assert in_second == received(second)
 
 

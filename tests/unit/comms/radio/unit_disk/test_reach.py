@@ -72,11 +72,11 @@ def test_range_and_bearing_are_exact_without_noise():
     result = run(make_medium(radio, 3), at((-2, 0, 0), (0, 0, np.pi / 2), (0, -1, 0)), lambda _: packets([0, 2]), 1)
     links = result.rows("received", "receiver", "sender_index")
     measured = zip(result.measured("range_m"), result.measured("bearing_rad"), strict=True)
-    seen = dict(zip(links, measured, strict=True))
-    assert seen[1, 0] == (2.0, np.pi / 2)
-    assert seen[1, 2] == (1.0, np.pi)
-    assert seen[0, 2] == pytest.approx((5**0.5, np.arctan2(-1, 2)))
-    assert seen[2, 0] == pytest.approx((5**0.5, np.arctan2(1, -2)))
+    measures = dict(zip(links, measured, strict=True))
+    assert measures[1, 0] == (2.0, np.pi / 2)
+    assert measures[1, 2] == (1.0, np.pi)
+    assert measures[0, 2] == pytest.approx((5**0.5, np.arctan2(-1, 2)))
+    assert measures[2, 0] == pytest.approx((5**0.5, np.arctan2(1, -2)))
 
 
 def test_measures_of_the_radio_come_with_each_packet():
@@ -165,15 +165,15 @@ def test_torus_robots_hear_by_the_shortest_way_once(range_m: float) -> None:
     out = run(torus(Radio(range_m=range_m, measures=EXACT), 40, arenas=2), pose, everybody(80), ticks=1, quiet_ticks=2)
     receiver, sender = out.received("receiver"), out.received("sender_index")
     sender = sender + receiver // 40 * 40
-    heard = pairs(receiver, sender)
-    assert heard == expected_pairs(pose, 40, range_m)
-    assert len(heard) == len(receiver)
+    links = pairs(receiver, sender)
+    assert links == expected_pairs(pose, 40, range_m)
+    assert len(links) == len(receiver)
     shortest = away(pose)[receiver, sender]
     assert out.measured("range_m") == pytest.approx(np.hypot(*shortest.T), abs=1e-12)
     bearing = np.arctan2(shortest[:, 1], shortest[:, 0]) - pose[receiver, 2]
     assert np.cos(out.measured("bearing_rad") - bearing) == pytest.approx(1.0, abs=1e-12)
     edges = torus(Radio(range_m=range_m), 40, arenas=2).step(0, pose).edges
-    assert pairs(*edges.T) == {pair for pair in heard if pair[0] < pair[1]}
+    assert pairs(*edges.T) == {pair for pair in links if pair[0] < pair[1]}
 
 
 def test_torus_propagation_takes_the_shortest_way() -> None:
