@@ -171,13 +171,13 @@ def stumbling(tmp_path):
 
 
 @pytest.fixture
-def here(monkeypatch):
+def executors(monkeypatch):
     """Campaigns of this test need no processes: a second less for each."""
-    executors: list[InThisProcess] = []
+    opened: list[InThisProcess] = []
 
-    def opened(on, workers, scenario):
-        executors.append(InThisProcess())
-        return executors[-1]
+    def open_executor(on, workers, scenario):
+        opened.append(InThisProcess())
+        return opened[-1]
 
-    monkeypatch.setattr(sweeping, "open_executor", opened)
-    return executors
+    monkeypatch.setattr(sweeping, "open_executor", open_executor)
+    return opened

@@ -146,7 +146,7 @@ def scenario(tmp_path):
 
 
 @pytest.fixture
-def here(monkeypatch):
+def executors(monkeypatch):
     """Tunings of this test need no processes: a second less for each."""
     monkeypatch.setattr(run, "open_executor", lambda *_: InThisProcess())
 

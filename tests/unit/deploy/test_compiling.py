@@ -51,15 +51,15 @@ def status_of(clock: Clock, compiling: CompileTime) -> Status:
 
 @pytest.mark.parametrize("tick", [0, 1, 2])
 def test_status_says_compiling_in_a_tick_that_compiles_and_leaves_it_out_of_the_cost(tick):
-    clock, swarm = FakeClock(), static(2)
+    clock, run = FakeClock(), static(2)
     with CompileTime(clock) as compiling:
         status = status_of(clock, compiling)
-        status.begin(swarm)
+        status.begin(run)
         status._controls.wait(0, lambda: False)
         for before in range(tick):
             status.began()
             clock.time_ns += 4 * MS
-            status.see(truth(swarm, before))
+            status.see(truth(run, before))
         status.began()
         assert status.now()["state"] == "running"
         with trigger_event(COMPILE_EVENT):
@@ -67,6 +67,6 @@ def test_status_says_compiling_in_a_tick_that_compiles_and_leaves_it_out_of_the_
             assert status.now()["state"] == "compiling"
         clock.time_ns += 4 * MS
         assert status.now()["state"] == "compiling"  # until the tick ends, though no kernel is under way
-        status.see(truth(swarm, tick))
+        status.see(truth(run, tick))
         assert status.now()["state"] == "running"
     assert status.now()["measures_ms"] == (None if tick == 0 else pytest.approx(4.0))

@@ -18,10 +18,10 @@ from tests.support.refusals import refused_input
 
 
 def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets():
-    swarm = static(300)
+    run = static(300)
     sensors = {"flock": GroupReadings(np.arange(300), {"compass.heading_rad": np.arange(300.0)})}
-    full = truth(swarm, edges=edges((0, 1)), readings=sensors, finished=finished([0] * 2001, [1] * 2001))
-    sampling, values = Sampling(swarm, swarm.robot_names[7]), np.zeros((1, 1))
+    full = truth(run, edges=edges((0, 1)), readings=sensors, finished=finished([0] * 2001, [1] * 2001))
+    sampling, values = Sampling(run, run.robot_names[7]), np.zeros((1, 1))
     shown = [sampling.frame(full, 1, values, at * NS_PER_S // 30).truth for at in range(30)]
     assert sum(glimpse.edges is not None for glimpse in shown) == 5
     assert (
@@ -36,8 +36,8 @@ def test_large_swarms_show_fewer_links_the_senses_of_one_and_no_flood_of_packets
 
 def test_ticks_are_taken_once():
     since = PendingTicks()
-    since.add(truth(swarm := static(2), 0))
-    since.add(truth(swarm, 1))
+    since.add(truth(run := static(2), 0))
+    since.add(truth(run, 1))
     together, ticks = since.pop()
     assert (together.tick, ticks) == (1, 2)
     with pytest.raises(ValueError, match="expected a tick"):

@@ -45,9 +45,9 @@ def test_report_of_another_name_has_separate_figures(report, campaign, tmp_path)
 
 
 def test_report_of_a_run_lies_in_its_folder(report, tmp_path):
-    swarm = static(3)
+    run = static(3)
     (tmp_path / "run").mkdir()
-    run_folder(tmp_path / "run", swarm, wandering(swarm, 12))
+    run_folder(tmp_path / "run", run, wandering(run, 12))
     code, out, _ = report(tmp_path / "run")
     assert code == 0
     assert out.splitlines()[0] == f"written: {tmp_path}/run/report.html"

@@ -1,5 +1,5 @@
 """Fixtures of these tests."""
 
-from tests.support.deploy.campaign import here, scenario, stumbling
+from tests.support.deploy.campaign import executors, scenario, stumbling
 
-__all__ = ["here", "scenario", "stumbling"]
+__all__ = ["executors", "scenario", "stumbling"]

@@ -43,7 +43,7 @@ def undisturbed(tmp_path_factory):
 
 
 @pytest.fixture
-def whole(undisturbed, tmp_path, here):
+def whole(undisturbed, tmp_path, executors):
     """A copy of it."""
     return copytree(undisturbed, tmp_path / "whole")
 
@@ -83,11 +83,11 @@ def test_whichever_write_was_the_last_nothing_is_lost_or_there_twice(tmp_path, s
     same(folder, whole)
 
 
-def test_resume_runs_only_what_is_missing(whole, here):
+def test_resume_runs_only_what_is_missing(whole, executors):
     (whole / "summary.parquet").unlink()
     assert resume(whole).done == 4
     assert resume(whole).is_over
-    assert [len(executor.tasks) for executor in here] == [0, 0]
+    assert [len(executor.tasks) for executor in executors] == [0, 0]
 
 
 def test_failed_runs_stay_unless_they_are_to_be_tried_again(tmp_path, whole):
@@ -146,7 +146,7 @@ def test_campaign_folder_is_for_one_process_at_a_time(whole):
         resume(whole)
 
 
-def test_full_disk_loses_no_finished_runs_of_a_sweep(tmp_path, scenario, here, monkeypatch):
+def test_full_disk_loses_no_finished_runs_of_a_sweep(tmp_path, scenario, executors, monkeypatch):
     folder, count = tmp_path / "c", 3
     with monkeypatch.context() as patched:
         dying_at(patched, count, FULL)
@@ -156,12 +156,12 @@ def test_full_disk_loses_no_finished_runs_of_a_sweep(tmp_path, scenario, here, m
     assert "No space left on device" in str(told.value)
     assert str(told.value).endswith(f"swarmwire sweep --resume {folder}")
     assert len(rows_in(folder)) == 2 * (count // 2)
-    assert here[0].closed
+    assert executors[0].closed
     assert resume(folder).is_over
     assert len(rows_in(folder)) == 4
 
 
-def test_series_that_cannot_be_joined_are_no_loss_either(tmp_path, scenario, here, monkeypatch):
+def test_series_that_cannot_be_joined_are_no_loss_either(tmp_path, scenario, executors, monkeypatch):
     import polars as pl
 
     sink = pl.LazyFrame.sink_parquet
@@ -198,13 +198,13 @@ def sound(tmp_path_factory):
 
 
 @pytest.fixture
-def untouched(sound, tmp_path, here):
+def untouched(sound, tmp_path, executors):
     """A copy, for one test to damage."""
     return copytree(sound / "whole", tmp_path / "whole")
 
 
 @pytest.fixture
-def half(sound, tmp_path, here):
+def half(sound, tmp_path, executors):
     """A copy, for one test to damage."""
     return copytree(sound / "half", tmp_path / "half")
 

@@ -93,13 +93,13 @@ def test_campaign_folder_says_what_was_run_and_holds_nothing_else(reference):
     assert (reference / "c" / "scenario" / "scenario.toml").exists()
 
 
-def test_without_series_there_are_none(scenario, tmp_path, here):
+def test_without_series_there_are_none(scenario, tmp_path, executors):
     sweep(scenario, seeds=2, out=tmp_path / "c", series=False)
     assert not (tmp_path / "c" / "series").exists()
     assert len(rows_in(tmp_path / "c")) == 2
 
 
-def test_files_that_points_name_are_kept_with_the_campaign(tmp_path, scenario, here):
+def test_files_that_points_name_are_kept_with_the_campaign(tmp_path, scenario, executors):
     for name, speed in (("slow", 0.01), ("fast", 0.1)):
         code = (
             f"from swarmwire.agent import Agent\nclass Mine(Agent):\n    def step(self, it): it.drive({speed}, 0.0)\n"
@@ -114,7 +114,7 @@ def test_files_that_points_name_are_kept_with_the_campaign(tmp_path, scenario, h
         assert run(scenario, overrides=[f"robots.pair.agent={agent}"]).trajectory_sha256 == [row["trajectory_sha256"]]
 
 
-def test_chosen_seeds_are_recorded_in_full(tmp_path, scenario, here):
+def test_chosen_seeds_are_recorded_in_full(tmp_path, scenario, executors):
     sweep(scenario, seeds=2, vary={"radio.loss": [0.0, 0.5]}, out=tmp_path / "c", record_seeds=[2])
     assert sorted(path.name for path in (tmp_path / "c" / "runs").iterdir()) == ["run-000001", "run-000003"]
     recorded = RunFolder(tmp_path / "c" / "runs" / "run-000003")
@@ -146,14 +146,14 @@ def noting(submit, name, done_by):
     return submit_noted
 
 
-def test_drawn_designs_say_between_which_values(tmp_path, scenario, here):
+def test_drawn_designs_say_between_which_values(tmp_path, scenario, executors):
     sweep(scenario, seeds=1, vary={"radio.loss": "0:0.5"}, design="latin", points=4, out=tmp_path / "c")
     campaign = read_campaign(tmp_path / "c")
     assert campaign.vary == {"radio.loss": {"from": 0.0, "to": 0.5}}
     assert [row["radio.loss"] for row in rows_in(tmp_path / "c")] == [point["radio.loss"] for point in campaign.points]
 
 
-def test_arenas_that_stop_and_times_of_metrics_are_the_same_packed_and_alone(tmp_path, scenario, here):
+def test_arenas_that_stop_and_times_of_metrics_are_the_same_packed_and_alone(tmp_path, scenario, executors):
     ends = ['stop={metric="order", at_least=0.8, hold_s=0.1}', 'metrics=["aggregation_time_s"]', "duration_s=1.0"]
     for name, batch in (("packed", 6), ("alone", 1)):
         sweep(scenario, seeds=6, out=tmp_path / name, overrides=ends, batch=batch)
@@ -173,7 +173,7 @@ def test_arenas_that_stop_and_times_of_metrics_are_the_same_packed_and_alone(tmp
     ]  # fmt: skip
 
 
-def test_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling, here):
+def test_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling, executors):
     done = sweep(stumbling, seeds=4, out=tmp_path / "c", batch=4)
     rows = rows_in(tmp_path / "c")
     failed = [row["seed"] for row in rows if row["ended"] == "failed"]
@@ -190,14 +190,14 @@ def test_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling, he
     assert rows_in(tmp_path / "unpacked") == rows
 
 
-def test_seed_without_room_is_a_failed_row(tmp_path, scenario, here):
+def test_seed_without_room_is_a_failed_row(tmp_path, scenario, executors):
     crowd = ["robots.pair.count=20", 'robots.pair.place={how="disc", radius_m=0.05}']
     done = sweep(scenario, seeds=2, out=tmp_path / "c", overrides=crowd)
     assert done.failed == 2
     assert "room" in rows_in(tmp_path / "c")[0]["error"]
 
 
-def test_custom_metric_that_raises_is_a_failed_row(tmp_path, scenario, here):
+def test_custom_metric_that_raises_is_a_failed_row(tmp_path, scenario, executors):
     (tmp_path / "bad.py").write_text(
         "from dataclasses import dataclass\nfrom swarmwire.metrics.measures.metric import Metric\n"
         "@dataclass(frozen=True)\nclass Bad(Metric):\n    name = 'bad'; help = ''; bounds = (0.0, None)\n"
@@ -207,7 +207,7 @@ def test_custom_metric_that_raises_is_a_failed_row(tmp_path, scenario, here):
     assert "no number" in rows_in(tmp_path / "c")[1]["error"]
 
 
-def test_error_with_text_that_no_file_can_hold_is_recorded_with_substitutes(tmp_path, scenario, here):
+def test_error_with_text_that_no_file_can_hold_is_recorded_with_substitutes(tmp_path, scenario, executors):
     agent = (
         "from swarmwire.agent import Agent\nclass Odd(Agent):\n    def step(self, robot): raise OSError('a\\udc80b')\n"
     )
@@ -216,7 +216,7 @@ def test_error_with_text_that_no_file_can_hold_is_recorded_with_substitutes(tmp_
     assert "OSError: a?b" in rows_in(tmp_path / "c")[0]["error"]
 
 
-def test_agent_with_endless_recursion_fails_alike_in_any_pack(tmp_path, scenario, here):
+def test_agent_with_endless_recursion_fails_alike_in_any_pack(tmp_path, scenario, executors):
     agent = "from swarmwire.agent import Agent\nclass Deep(Agent):\n    def step(self, robot): self.step(robot)\n"
     (tmp_path / "deep.py").write_text(agent)
     for batch in (1, 2):
@@ -227,7 +227,7 @@ def test_agent_with_endless_recursion_fails_alike_in_any_pack(tmp_path, scenario
 
 
 @pytest.fixture
-def typed(monkeypatch, capsys, here):
+def typed(monkeypatch, capsys, executors):
     return lambda *arguments: called(monkeypatch, capsys, *arguments)
 
 

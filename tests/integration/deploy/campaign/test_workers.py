@@ -123,7 +123,7 @@ sweep(sys.argv[1], seeds=4, vary=vary, batch=1, workers=1, out=sys.argv[2], obse
 """
 
 
-def test_campaign_that_is_killed_leaves_no_worker_and_can_be_resumed(tmp_path, here):
+def test_campaign_that_is_killed_leaves_no_worker_and_can_be_resumed(tmp_path, executors):
     scenario, folder = scenario_in(tmp_path), tmp_path / "c"
     command = [sys.executable, "-c", KILLED, str(scenario), str(folder), "radio.loss", "0.0", "0.5"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:

@@ -1,5 +1,5 @@
 """Fixtures of these tests."""
 
-from tests.support.deploy.tuning import calculated, here, scenario
+from tests.support.deploy.tuning import calculated, executors, scenario
 
-__all__ = ["calculated", "here", "scenario"]
+__all__ = ["calculated", "executors", "scenario"]

@@ -134,7 +134,7 @@ def test_folder_without_a_tuning_is_refused_in_a_line(tmp_path, text):
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("executors")
 def test_best_trial_is_a_scenario_that_runs_from_the_folder_alone(tmp_path, scenario):
     found = tuned(
         scenario, tmp_path / "t", AT, "robots.pair.count=2:4", trials=6, seeds=1, overrides=("duration_s=0.3",)
@@ -148,7 +148,7 @@ def test_best_trial_is_a_scenario_that_runs_from_the_folder_alone(tmp_path, scen
     assert result.robots == found.best.parameters["robots.pair.count"]
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("executors")
 def test_trials_that_fail_are_told_of_and_never_the_best(tmp_path, scenario):
     searched = ("robots.pair.params.speed=0:1", AT)
     found = tuned(scenario, tmp_path / "t", *searched, trials=8, seeds=1)
@@ -165,7 +165,7 @@ def test_trials_that_fail_are_told_of_and_never_the_best(tmp_path, scenario):
     assert found.best.parameters["robots.pair.params.speed"] <= 0.5
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("executors")
 def test_values_that_are_invalid_together_fail_their_trial(tmp_path, scenario):
     searched = ("robots.pair.count=2,60", "arena.size_m=[4.0, 4.0],[0.3, 0.3]")
     found = tuned(scenario, tmp_path / "t", *searched, trials=6, seeds=1)
@@ -176,7 +176,7 @@ def test_values_that_are_invalid_together_fail_their_trial(tmp_path, scenario):
     assert found.is_over
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("executors")
 def test_choices_may_be_files_which_the_folder_keeps(tmp_path, scenario):
     (tmp_path / "other.py").write_text((tmp_path / "careful.py").read_text())
     searched = "robots.pair.agent=careful.py:Careful,other.py:Careful"
@@ -284,7 +284,9 @@ def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monk
     assert re.search("6 trials x 1 seeds; 3 of them", out.splitlines()[0])
 
 
-def test_tune_command_in_which_all_trials_fail_is_a_line_and_exit_code_1(tmp_path, scenario, monkeypatch, capsys, here):
+def test_tune_command_in_which_all_trials_fail_is_a_line_and_exit_code_1(
+    tmp_path, scenario, monkeypatch, capsys, executors
+):
     folder, searched = tmp_path / "t", "robots.pair.params.speed=0.6:1"
     arguments = ("--search", searched, *GOAL, "--trials", "2", "--seeds", "1", "--out", folder, "--quiet")
     code, out, errors = called(monkeypatch, capsys, "tune", scenario, *arguments)

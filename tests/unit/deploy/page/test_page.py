@@ -329,8 +329,8 @@ def test_token_differs_for_each_page():
 FOUR, NINE = static(robots=4), static(robots=9)
 
 
-def glimpse(tick=0, swarm=FOUR, **fields):
-    return ObservedTick(truth(swarm, tick, **fields), serial=tick, ticks=1, values=np.zeros((0, 1)))
+def glimpse(tick=0, run=FOUR, **fields):
+    return ObservedTick(truth(run, tick, **fields), serial=tick, ticks=1, values=np.zeros((0, 1)))
 
 
 def happened(changed, ended=False, serial=2):
@@ -353,7 +353,7 @@ def test_centre_is_that_of_the_robots_alive():
 def test_positions_shown_of_a_large_swarm_are_limited():
     large = static(robots=3 * MAX_POSITIONS)
     tick_numbers = TickNumbers(large)
-    tick_numbers.see(glimpse(swarm=large))
+    tick_numbers.see(glimpse(run=large))
     assert len(tick_numbers.numbers["places"]) == MAX_POSITIONS
 
 

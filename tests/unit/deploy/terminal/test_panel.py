@@ -24,18 +24,18 @@ TICKS = 1000
 HEALTH = RunnerHealth(ready=1000, lost=3, late_answers=123456, frames_dropped=7890, watchdog_stops=12)
 
 
-def figures_of(swarm: Static, ticks: int, clock: FakeClock, tick_ms: int = 20) -> Figures:
+def figures_of(run: Static, ticks: int, clock: FakeClock, tick_ms: int = 20) -> Figures:
     """The figures of a run whose packets meet every fate and whose events concern everybody."""
     metrics = Metrics(["order", "components", "largest_component"])
     figures = Figures(TICKS, metrics, clock)
-    metrics.begin(swarm)
-    figures.begin(swarm)
-    counts = tally(*[{fate: 1 + int(fate) for fate in Fate}] * swarm.arenas)
-    rows = swarm.arenas * swarm.robots
+    metrics.begin(run)
+    figures.begin(run)
+    counts = tally(*[{fate: 1 + int(fate) for fate in Fate}] * run.arenas)
+    rows = run.arenas * run.robots
     for tick in range(ticks):
         event = EventRecord(0, 1.0, "blackout", bool(tick % 2), np.ones(rows, np.bool_))
-        radio = {"tally": counts, "edges": edges((0, 1))} if swarm.range_m else {}
-        moment = truth(swarm, tick, pose=poses([0.1 * tick * row for row in range(rows)]), events=(event,), **radio)
+        radio = {"tally": counts, "edges": edges((0, 1))} if run.range_m else {}
+        moment = truth(run, tick, pose=poses([0.1 * tick * row for row in range(rows)]), events=(event,), **radio)
         metrics.see(moment)
         clock.time_ns += tick_ms * MS
         figures.see(moment)
@@ -69,10 +69,10 @@ def test_panel_has_the_terminals_width_and_a_constant_height(columns, rows, radi
     clock = FakeClock()
     pace = None if factor is None else Pace(clock, 10, factor, lambda _: None)
     controls = Controls(clock, 10, pace)
-    swarm = static(20, arenas, radio)
+    run = static(20, arenas, radio)
     heights = set()
     for ticks in (0, 1, 15, 100):
-        figures = figures_of(swarm, ticks, clock)
+        figures = figures_of(run, ticks, clock)
         for ask in (controls.pause, controls.resume):
             lines = shown(figures, controls, health, columns, rows)
             assert {cell_len(line) for line in lines} == {columns}
@@ -84,9 +84,9 @@ def test_panel_has_the_terminals_width_and_a_constant_height(columns, rows, radi
 
 def test_panel_lines_that_are_too_long_are_cut_not_wrapped():
     clock = FakeClock()
-    swarm = static(4)
-    figures = figures_of(swarm, 20, clock)
-    object.__setattr__(swarm, "name", "a name [bold]that has no end " * 9)
+    run = static(4)
+    figures = figures_of(run, 20, clock)
+    object.__setattr__(run, "name", "a name [bold]that has no end " * 9)
     lines = shown(figures, Controls(clock, 10), HEALTH, 60, 24)
     assert "[bold]" in lines[0]
     assert {cell_len(line) for line in lines} == {60}
@@ -94,17 +94,17 @@ def test_panel_lines_that_are_too_long_are_cut_not_wrapped():
 
 
 def test_figures_are_those_of_the_last_second_and_of_the_whole_run():
-    clock, swarm = FakeClock(), static(4)
+    clock, run = FakeClock(), static(4)
     metrics = Metrics(["order", "components"])
     figures = Figures(TICKS, metrics, clock)
-    metrics.begin(swarm)
-    figures.begin(swarm)
+    metrics.begin(run)
+    figures.begin(run)
     assert np.isnan([figures.link_pdr, figures.link_pdr_1s, figures.speed(1.0)]).all()
     for tick in range(40):
         fates = (
             {Fate.RECEIVED: 1, Fate.LOST: 3} if tick < 20 else {Fate.RECEIVED: 3, Fate.LOST: 1, Fate.OUT_OF_RANGE: 5}
         )
-        moment = truth(swarm, tick, tally=tally(fates), edges=edges((0, 1), (1, 2)) if tick < 20 else edges())
+        moment = truth(run, tick, tally=tally(fates), edges=edges((0, 1), (1, 2)) if tick < 20 else edges())
         metrics.see(moment)
         clock.time_ns += (50 if tick < 20 else 200) * MS
         figures.see(moment)
@@ -119,19 +119,19 @@ def test_figures_are_those_of_the_last_second_and_of_the_whole_run():
 
 
 def test_arenas_that_have_stopped_are_told_once_there_are_any():
-    figures = figures_of(swarm := static(2, arenas=3), 0, FakeClock())
+    figures = figures_of(run := static(2, arenas=3), 0, FakeClock())
     texts = []
     for running in ([1, 1, 1], [1, 0, 1], [0, 0, 1]):
-        figures.see(truth(swarm, running=np.array(running, np.bool_)))
+        figures.see(truth(run, running=np.array(running, np.bool_)))
         texts.append(figures.stopped)
     assert texts == ["", ", 2 of 3 arenas running", ", 1 of 3 arenas running"]
 
 
 def test_history_keeps_its_averages_as_the_minute_moves_on():
-    clock, swarm = FakeClock(), static(4)
-    figures = figures_of(swarm, 800, clock)
+    clock, run = FakeClock(), static(4)
+    figures = figures_of(run, 800, clock)
     before = figures.history("order", 2)
-    after = figures_of(swarm, 820, clock).history("order", 2)
+    after = figures_of(run, 820, clock).history("order", 2)
     assert len(before) == 30
     assert after[:29] == before[1:]
 
@@ -143,14 +143,14 @@ def test_speed_is_right_for_any_duration_of_a_tick(tick_ms):
 
 
 def test_compiling_is_shown_until_the_tick_ends_and_counts_neither_as_speed_nor_as_time_left():
-    clock, swarm, metrics, compiled_ns = FakeClock(), static(4), Metrics(["order"]), [5 * MS]
+    clock, run, metrics, compiled_ns = FakeClock(), static(4), Metrics(["order"]), [5 * MS]
     figures = Figures(TICKS, metrics, clock, lambda: compiled_ns[0])
-    metrics.begin(swarm)
-    figures.begin(swarm)
+    metrics.begin(run)
+    figures.begin(run)
 
     def tick(number: int, takes_ms: int) -> None:
         clock.time_ns += takes_ms * MS
-        moment = truth(swarm, number)
+        moment = truth(run, number)
         metrics.see(moment)
         figures.see(moment)
 
