@@ -33,60 +33,60 @@ class Turned(Metric):
         return lambda view: np.count_nonzero(view.heading_rad > self.above_rad, axis=1).astype(np.float64)
 
 
-def seen(metrics, of, *ticks):
-    watch(of, (truth(of, tick, **fields) for tick, fields in enumerate(ticks)), metrics)
+def summaries(metrics, run, *ticks):
+    watch(run, (truth(run, tick, **fields) for tick, fields in enumerate(ticks)), metrics)
     return metrics.end(None)["metrics"]
 
 
 def test_level_has_final_mean_min_and_max_over_the_ticks():
-    of = static(2)
-    [found] = seen(Metrics(["order"]), of, *({"pose": poses([0.0, turn])} for turn in (0.0, np.pi, np.pi / 2)))
+    run = static(2)
+    [summary] = summaries(Metrics(["order"]), run, *({"pose": poses([0.0, turn])} for turn in (0.0, np.pi, np.pi / 2)))
     half = np.sqrt(0.5)
     expected = {"final": half, "mean": (1 + half) / 3, "min": 0.0, "max": 1.0}
-    assert found["order"] == {name: pytest.approx(value, abs=1e-15) for name, value in expected.items()}
+    assert summary["order"] == {name: pytest.approx(value, abs=1e-15) for name, value in expected.items()}
 
 
 def test_count_ends_with_its_total_and_statistics_of_its_increments():
-    of = static(2, arenas=2)
+    run = static(2, arenas=2)
     onsets = ({"contact_onsets": np.array(pairs)} for pairs in ([[1, 0], [0, 2]], [[0, 0], [0, 2]], [[3, 0], [0, 0]]))
-    first, second = seen(Metrics(), of, *onsets)
+    first, second = summaries(Metrics(), run, *onsets)
     assert first["collisions"] == {"final": 4.0, "mean": pytest.approx(4 / 3), "min": 0.0, "max": 3.0}
     assert second["collisions"] == {"final": 0.0, "mean": 0.0, "min": 0.0, "max": 0.0}
     assert second["wall_contacts"] == {"final": 4.0, "mean": pytest.approx(4 / 3), "min": 0.0, "max": 2.0}
 
 
 def test_latest_is_the_value_of_a_level_and_the_total_of_a_count():
-    of, metrics = static(2), Metrics()
+    run, metrics = static(2), Metrics()
     ticks = ({"pose": poses([0.0, turn]), "contact_onsets": np.array([[1, 0]])} for turn in (np.pi, 0.0))
-    seen(metrics, of, *ticks)
+    summaries(metrics, run, *ticks)
     assert metrics.latest["order"].tolist() == [1.0]
     assert metrics.latest["collisions"].tolist() == [2.0]
 
 
 def test_ticks_without_a_value_are_left_out_and_what_never_had_one_is_null():
-    of = static(2, radio=False)
+    run = static(2, radio=False)
     dead = {"alive": np.zeros(2, np.bool_)}
-    [found] = seen(Metrics(), of, {"pose": poses([0.0, 0.0])}, dead)
-    assert found["order"] == {"final": None, "mean": 1.0, "min": 1.0, "max": 1.0}
-    assert found["largest_component"] == dict.fromkeys(("final", "mean", "min", "max"))
+    [summary] = summaries(Metrics(), run, {"pose": poses([0.0, 0.0])}, dead)
+    assert summary["order"] == {"final": None, "mean": 1.0, "min": 1.0, "max": 1.0}
+    assert summary["largest_component"] == dict.fromkeys(("final", "mean", "min", "max"))
 
 
 def test_metrics_of_a_run_without_a_tick_are_null():
-    [found] = seen(Metrics(["order"]), static())
-    assert found["order"] == dict.fromkeys(("final", "mean", "min", "max"))
+    [summary] = summaries(Metrics(["order"]), static())
+    assert summary["order"] == dict.fromkeys(("final", "mean", "min", "max"))
 
 
 def test_metrics_summary_is_plain_json():
-    of = static(3, arenas=2)
-    found = seen(Metrics(), of, {"edges": edges((0, 1))})
-    assert json.loads(json.dumps(found, allow_nan=False)) == found
+    run = static(3, arenas=2)
+    summary = summaries(Metrics(), run, {"edges": edges((0, 1))})
+    assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 
 def test_metric_with_parameters_is_passed_as_an_object():
-    of = static(3)
-    [found] = seen(Metrics(["order", Turned(above_rad=1.0)]), of, {"pose": poses([0.0, 2.0, 3.0])})
-    assert list(found) == ["order", "turned"]
-    assert found["turned"]["final"] == 2.0
+    run = static(3)
+    [summary] = summaries(Metrics(["order", Turned(above_rad=1.0)]), run, {"pose": poses([0.0, 2.0, 3.0])})
+    assert list(summary) == ["order", "turned"]
+    assert summary["turned"]["final"] == 2.0
 
 
 @pytest.mark.parametrize(
@@ -98,10 +98,10 @@ def test_unknown_and_duplicate_metric_names_are_refused(names, hint):
 
 
 def test_rows_are_folded_by_arena():
-    of = static(3, arenas=2)
+    run = static(3, arenas=2)
     pose, velocity = np.arange(36.0).reshape(2, 6, 3)
     alive = np.array([True, True, False, True, False, False])
-    view = TickView(of, truth(of, pose=pose, velocity=velocity, alive=alive))
+    view = TickView(run, truth(run, pose=pose, velocity=velocity, alive=alive))
     assert (view.position_m[1, 2] == pose[5, :2]).all()
     assert (view.velocity[1, 2, :2] == velocity[5, :2]).all()
     assert view.heading_rad[0, 1] == pose[1, 2]
@@ -110,12 +110,12 @@ def test_rows_are_folded_by_arena():
 
 
 def test_components_are_those_of_the_robots_alive():
-    of = static(3, arenas=2)
+    run = static(3, arenas=2)
     alive = np.array([True, True, True, True, True, False])
-    found = TickView(of, truth(of, alive=alive, edges=edges((0, 1), (1, 2), (4, 5)))).components
-    assert isinstance(found, Components)
-    assert found.number.tolist() == [1, 2]
-    assert found.largest.tolist() == [3, 1]
+    components = TickView(run, truth(run, alive=alive, edges=edges((0, 1), (1, 2), (4, 5)))).components
+    assert isinstance(components, Components)
+    assert components.number.tolist() == [1, 2]
+    assert components.largest.tolist() == [3, 1]
 
 
 def test_vectors_agree_by_how_near_their_sum_comes_to_the_most():
@@ -128,8 +128,8 @@ def test_vectors_agree_by_how_near_their_sum_comes_to_the_most():
 
 
 def test_directions_are_the_cosines_and_sines_of_headings():
-    of = static(3, arenas=2)
-    view = TickView(of, truth(of, pose=poses([0.3, -2.0, 9.0, 0.0, 3.1, -0.1])))
+    run = static(3, arenas=2)
+    view = TickView(run, truth(run, pose=poses([0.3, -2.0, 9.0, 0.0, 3.1, -0.1])))
     np.testing.assert_allclose(view.direction[0], np.cos(view.heading_rad))
     np.testing.assert_allclose(view.direction[1], np.sin(view.heading_rad))
 
@@ -147,8 +147,8 @@ class Ticks(Sampled):
 
 
 def sampled_in(every_s, ticks=12):
-    of = static(2, arenas=2)
-    first, second = in_each_tick(of, (truth(of, tick) for tick in range(ticks)), Ticks(every_s=every_s))[:, 0].T
+    run = static(2, arenas=2)
+    first, second = in_each_tick(run, (truth(run, tick) for tick in range(ticks)), Ticks(every_s=every_s))[:, 0].T
     assert first.tolist() == second.tolist()
     return first.tolist()
 
@@ -167,10 +167,10 @@ def test_sampled_metric_is_measured_at_the_start_and_each_multiple(every_s, tick
 
 
 def test_sampled_metric_serves_many_runs():
-    metrics, of = Metrics([Ticks()]), static(1)
+    metrics, run = Metrics([Ticks()]), static(1)
     for tick in (3, 7):
-        metrics.begin(of)
-        metrics.see(truth(of, tick))
+        metrics.begin(run)
+        metrics.see(truth(run, tick))
         assert metrics.latest["ticks_sampled"].tolist() == [tick]
 
 
@@ -207,25 +207,25 @@ class Tallied(Script):
 
 def judged(values, *conditions, kind=Script):
     """The judge after these values (ticks, arenas) at 10 Hz, and in which tick each arena was found over (None)."""
-    of = static(1, arenas=len(values[0]))
+    run = static(1, arenas=len(values[0]))
     metrics = Metrics([kind(values=tuple(map(tuple, values)))])
     stop_conditions = MeasuredStopConditions(metrics, conditions)
-    metrics.begin(of)
-    stop_conditions.begin(of)
-    found = [None] * of.arenas
+    metrics.begin(run)
+    stop_conditions.begin(run)
+    over_at = [None] * run.arenas
     for tick in range(len(values)):
         for observer in (metrics, stop_conditions):
-            observer.see(truth(of, tick))
+            observer.see(truth(run, tick))
         over = stop_conditions.done()
-        for arena in range(of.arenas):
-            if over is not None and over[arena] and found[arena] is None:
-                found[arena] = tick
-    return stop_conditions.end(None)["stops"], found
+        for arena in range(run.arenas):
+            if over is not None and over[arena] and over_at[arena] is None:
+                over_at[arena] = tick
+    return stop_conditions.end(None)["stops"], over_at
 
 
 def one(series, *conditions, **options):
-    stops, found = judged([[value] for value in series], *conditions, **options)
-    return stops[0]["stop_time_s"], stops[0]["stopped_by"], found[0]
+    stops, over_at = judged([[value] for value in series], *conditions, **options)
+    return stops[0]["stop_time_s"], stops[0]["stopped_by"], over_at[0]
 
 
 def script(comparison="at_least", limit=1.0, hold_s=0.0):
@@ -288,22 +288,22 @@ def test_condition_on_a_count_compares_its_total():
     ),
 )
 def test_stop_conditions_are_those_of_the_definition(values, conditions):
-    stops, found = judged(values, *conditions)
+    stops, over_at = judged(values, *conditions)
     for arena, series in enumerate(zip(*values, strict=True)):
         stop = by_definition(series, conditions)
         assert stops[arena] == {"stop_time_s": stop[1], "stopped_by": stop[2]}
-        assert found[arena] == stop[0]
+        assert over_at[arena] == stop[0]
 
 
 def by_definition(series, conditions):
     """The tick in which it is over, the start of the held stretch, and the condition, each looked for from scratch."""
     for now in range(len(series)):
-        for of in conditions:
-            true = [COMPARED[of.comparison](value, of.limit) for value in series]
+        for condition in conditions:
+            true = [COMPARED[condition.comparison](value, condition.limit) for value in series]
             stretches = [start for start in range(now + 1) if all(true[start : now + 1])]
-            long_enough = [t0 for t0 in stretches if time_ns(now) - time_ns(t0) >= to_ns(of.hold_s)]
+            long_enough = [t0 for t0 in stretches if time_ns(now) - time_ns(t0) >= to_ns(condition.hold_s)]
             if long_enough:
-                return now, to_s(time_ns(min(stretches))), str(of)
+                return now, to_s(time_ns(min(stretches))), str(condition)
     return None, None, None
 
 

@@ -130,9 +130,9 @@ def measure(history: History) -> Array:
     return measured(tried(), history)[0]
 
 
-def broken(found: Array, expected: Array, but: Callable[[Laws], bool] = lambda _: False) -> set[str]:
+def broken(values: Array, expected: Array, but: Callable[[Laws], bool] = lambda _: False) -> set[str]:
     """The metrics whose values (…, metrics, arenas) differ by more than rounding, without those that are exempt."""
-    fits = np.isclose(found, expected, rtol=1e-7, atol=1e-7, equal_nan=True)
+    fits = np.isclose(values, expected, rtol=1e-7, atol=1e-7, equal_nan=True)
     rows = fits.swapaxes(-2, 0).reshape(len(LAWS), -1).all(axis=1)
     return {name for (name, laws), fit in zip(LAWS.items(), rows, strict=True) if not fit and not but(laws)}
 
@@ -249,7 +249,7 @@ def test_without_a_radio_only_what_tells_of_it_has_no_value(history: History) ->
     names = ("edges", "tally", "finished", "departed")
     expected = measure(history)
     expected[:, [laws.radio for laws in LAWS.values()]] = NAN
-    assert not broken(measure(history.each(lambda seen: replace(seen, **dict.fromkeys(names)))), expected)
+    assert not broken(measure(history.each(lambda truth: replace(truth, **dict.fromkeys(names)))), expected)
 
 
 @law
@@ -264,9 +264,9 @@ def test_metric_object_serves_many_runs_alike(history: History) -> None:
 def test_values_are_within_bounds_counts_only_grow_and_times_stay(history: History) -> None:
     for metric, values in zip(tried(), measure(history).swapaxes(0, 1), strict=True):
         low, high = metric.bounds
-        known = values[~np.isnan(values)]
-        assert low is None or (known >= low).all(), metric.name
-        assert high is None or (known <= high).all(), metric.name
+        defined = values[~np.isnan(values)]
+        assert low is None or (defined >= low).all(), metric.name
+        assert high is None or (defined <= high).all(), metric.name
         if metric.kind != "level":
             earlier, later = values[:-1], values[1:]
             grows = later >= earlier if metric.kind == "count" else later == earlier

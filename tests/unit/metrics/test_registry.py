@@ -31,8 +31,8 @@ def east(tmp_path: Path) -> str:
     return f"{tmp_path / 'own.py'}:East"
 
 
-def item(spec, place=0, **params):
-    return MetricEntry(f"metrics.{place}.metric" if params else f"metrics.{place}", spec, params)
+def item(spec, index=0, **params):
+    return MetricEntry(f"metrics.{index}.metric" if params else f"metrics.{index}", spec, params)
 
 
 def stop(spec):
@@ -65,16 +65,16 @@ def test_without_the_standard_ones_there_is_what_is_listed(east):
 
 
 def test_standard_metric_that_is_listed_keeps_its_place_with_parameters():
-    found = select_metrics([item("fragmentations", hold_s=3)], "s.toml").metrics
-    assert [metric.name for metric in found] == standard_names()
-    assert METRICS["fragmentations"](hold_s=3.0) in found
+    metrics = select_metrics([item("fragmentations", hold_s=3)], "s.toml").metrics
+    assert [metric.name for metric in metrics] == standard_names()
+    assert METRICS["fragmentations"](hold_s=3.0) in metrics
     assert select_metrics([item("order")], "s.toml") == select_metrics([], "s.toml")
 
 
 def test_metric_class_of_a_file_takes_parameters_and_is_noted_as_code(east):
-    found = select_metrics([item(east, from_m=2)], "s.toml", with_standard=False)
-    assert [(metric.name, metric.from_m) for metric in found.metrics] == [("east", 2.0)]
-    assert found.code == (east,)
+    selected = select_metrics([item(east, from_m=2)], "s.toml", with_standard=False)
+    assert [(metric.name, metric.from_m) for metric in selected.metrics] == [("east", 2.0)]
+    assert selected.code == (east,)
 
 
 def test_stop_metric_is_measured_once_with_its_listed_parameters(east):
@@ -86,7 +86,7 @@ def test_stop_metric_is_measured_once_with_its_listed_parameters(east):
 
 
 @pytest.mark.parametrize(
-    ("asked", "key", "hint"),
+    ("entry", "key", "hint"),
     [
         (item("ordre"), "metrics.0", "did you mean order?"),
         (item("ordre", x=1), "metrics.0.metric", "did you mean order?"),
@@ -98,8 +98,8 @@ def test_stop_metric_is_measured_once_with_its_listed_parameters(east):
         (item("order", gap_m=1), "metrics.0.gap_m", "none"),
     ],
 )
-def test_unknown_metric_or_parameter_is_refused_with_its_key(asked, key, hint):
-    error = refused(asked)
+def test_unknown_metric_or_parameter_is_refused_with_its_key(entry, key, hint):
+    error = refused(entry)
     assert (error.where, error.key) == ("s.toml", key)
     assert hint in error.expected
 
@@ -119,9 +119,9 @@ def site(tmp_path, monkeypatch):
 
 def test_package_provides_metrics_by_name(site):
     install(site, "compass_metrics", {"east": "East"})
-    found = select_metrics([item("east", from_m=1)], "s.toml", with_standard=False)
-    assert [metric.from_m for metric in found.metrics] == [1.0]
-    assert found.code == ("compass_metrics:East",)
+    selected = select_metrics([item("east", from_m=1)], "s.toml", with_standard=False)
+    assert [metric.from_m for metric in selected.metrics] == [1.0]
+    assert selected.code == ("compass_metrics:East",)
     assert names(stop("east"), with_standard=False) == ["east"]
     assert "east?" in refused(item("eest")).expected
 
@@ -238,17 +238,17 @@ def test_custom_metric_with_a_wrong_attribute_is_refused(monkeypatch, name, valu
     with pytest.raises(BadInput) as refused:
         custom_metric_class(spec_of(Good), "s.toml", "metrics.0")
     assert (refused.value.where, refused.value.key) == ("s.toml", "metrics.0")
-    assert all(told in refused.value.expected for told in ("Good: ", name, repr(value)))
+    assert all(text in refused.value.expected for text in ("Good: ", name, repr(value)))
 
 
-@pytest.mark.parametrize(("kind", "said"), [(BeginsBadly, "no start"), (Wide, "could not broadcast")])
-def test_custom_metric_that_fails_is_named(kind, said):
-    with pytest.raises(CustomCodeFailed, match=rf"mine \({kind.__name__}\)[\s\S]*{said}"):
+@pytest.mark.parametrize(("kind", "text"), [(BeginsBadly, "no start"), (Wide, "could not broadcast")])
+def test_custom_metric_that_fails_is_named(kind, text):
+    with pytest.raises(CustomCodeFailed, match=rf"mine \({kind.__name__}\)[\s\S]*{text}"):
         _measure(kind())
 
 
 def _measure(metric):
-    metrics, of = Metrics([metric]), static(3)
-    metrics.begin(of)
-    metrics.see(truth(of, 7, pose=np.zeros((3, 3))))
+    metrics, run = Metrics([metric]), static(3)
+    metrics.begin(run)
+    metrics.see(truth(run, 7, pose=np.zeros((3, 3))))
     return metrics

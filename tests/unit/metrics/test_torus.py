@@ -26,10 +26,10 @@ def test_distances_between_senders_and_receivers_are_the_shortest():
     at = rng.uniform(-0.5, 0.5, (2, 50, 2)) * SIZE_M
     expected = apart(at[0], at[1])
     x, y = (np.concatenate([at[0, :, axis], at[1, :, axis]])[None] for axis in (0, 1))
-    found = RobotPositions(x, y, np.zeros((1, 100)), np.ones((1, 100), np.bool_), SIZE_M).apart_m(
+    distance_m = RobotPositions(x, y, np.zeros((1, 100)), np.ones((1, 100), np.bool_), SIZE_M).apart_m(
         np.zeros(50, np.int64), *np.arange(100).reshape(2, 50)
     )
-    assert found == pytest.approx(expected)
+    assert distance_m == pytest.approx(expected)
     assert np.hypot(*shortest_displacement(at[0] - at[1], TORUS).T) == pytest.approx(expected)
 
 
@@ -43,9 +43,9 @@ def test_link_across_the_seam_is_drawn_shortest_from_both_ends():
 
 
 def test_path_across_the_seam_has_no_jumps_and_keeps_its_end():
-    place = np.array([[(3.7, 2.9)], [(3.9, -3.0)], [(-3.9, -2.9)]], np.float32)
-    assert np.allclose(unwrap_path(place, TORUS), [[(-4.3, -3.1)], [(-4.1, -3.0)], [(-3.9, -2.9)]], atol=1e-6)
-    assert unwrap_path(place, replace(TORUS, boundary="walls")) is place
+    path = np.array([[(3.7, 2.9)], [(3.9, -3.0)], [(-3.9, -2.9)]], np.float32)
+    assert np.allclose(unwrap_path(path, TORUS), [[(-4.3, -3.1)], [(-4.1, -3.0)], [(-3.9, -2.9)]], atol=1e-6)
+    assert unwrap_path(path, replace(TORUS, boundary="walls")) is path
 
 
 def test_pictures_join_robots_across_the_seam_as_the_air_does():
@@ -58,7 +58,7 @@ def test_pictures_join_robots_across_the_seam_as_the_air_does():
         for j in range(i + 1, 70)
         if apart(at[i], at[j]) <= 2.0 and not is_blocked_on_floor(index, 0, *at[i], *at[j], *SIZE_M)
     }
-    found = in_range(at, np.ones(70, np.bool_), 2.0, OBSTACLES, SIZE_M)
-    assert {(min(pair), max(pair)) for pair in found.tolist()} == joined
+    links = in_range(at, np.ones(70, np.bool_), 2.0, OBSTACLES, SIZE_M)
+    assert {(min(pair), max(pair)) for pair in links.tolist()} == joined
     plain = in_range(at, np.ones(70, np.bool_), 2.0, OBSTACLES)
     assert len(plain) < len(joined)

@@ -29,10 +29,10 @@ class Watch(Observer):
     """An observer that collects every truth."""
 
     def __init__(self) -> None:
-        self.seen: list[Truth] = []
+        self.truths: list[Truth] = []
 
     def see(self, truth: Truth) -> None:
-        self.seen.append(truth)
+        self.truths.append(truth)
 
 
 class ForwardBackend:
@@ -67,7 +67,7 @@ def truths_of(
     obstacles = obstacle_arrays(world.static.obstacles)
     medium = RadioMedium(ChannelContext.open_space(scenario.radio, keys, len(poses), size_m, obstacles), 10)
     Loop(world, medium, backend or ForwardBackend(), [watch], scenario.events).run(ticks)
-    return watch.seen
+    return watch.truths
 
 
 def at(do: str, at_s: float, *names: str, **keys: Any) -> dict[str, Any]:
@@ -76,20 +76,20 @@ def at(do: str, at_s: float, *names: str, **keys: Any) -> dict[str, Any]:
 
 def test_killed_robot_brakes_and_does_not_act_until_it_is_revived():
     backend = ForwardBackend()
-    seen = truths_of(TWO, [at("kill", 0.45, "a-0", for_s=1.0)], backend=backend)
-    assert [truth.alive.tolist() for truth in seen] == [[not 5 <= tick < 15, True] for tick in range(30)]
+    truths = truths_of(TWO, [at("kill", 0.45, "a-0", for_s=1.0)], backend=backend)
+    assert [truth.alive.tolist() for truth in truths] == [[not 5 <= tick < 15, True] for tick in range(30)]
     assert backend.rows == [[1] if 5 <= tick < 15 else [0, 1] for tick in range(30)]
-    assert (seen[5].command[0] == 0).all()
-    assert np.array_equal(seen[7].pose[0], seen[15].pose[0])
-    assert seen[29].pose[0, 0] > seen[15].pose[0, 0] + 0.1
-    x = [truth.pose[1, 0] for truth in seen]
+    assert (truths[5].command[0] == 0).all()
+    assert np.array_equal(truths[7].pose[0], truths[15].pose[0])
+    assert truths[29].pose[0, 0] > truths[15].pose[0, 0] + 0.1
+    x = [truth.pose[1, 0] for truth in truths]
     assert x == [truth.pose[1, 0] for truth in truths_of(TWO, [])]
 
 
 def test_event_takes_effect_at_the_first_tick_at_or_after_its_time():
     for at_s, tick in ((0.0, 0), (0.3, 3), (0.31, 4)):
-        seen = truths_of(TWO, [at("kill", at_s, "a-1")], ticks=6)
-        [only] = [(truth.tick, happened) for truth in seen for happened in truth.events]
+        truths = truths_of(TWO, [at("kill", at_s, "a-1")], ticks=6)
+        [only] = [(truth.tick, happened) for truth in truths for happened in truth.events]
         assert only[0] == tick
         assert (only[1].serial, only[1].at_s, only[1].do, only[1].ended) == (0, at_s, "kill", False)
         assert only[1].changed.tolist() == [False, True]
@@ -97,20 +97,20 @@ def test_event_takes_effect_at_the_first_tick_at_or_after_its_time():
 
 def test_dead_robot_is_an_obstacle_that_can_be_pushed():
     """The pusher gets less far than alone, and the dead robot is never faster than the pusher."""
-    seen = truths_of([[-1.0, 0.0, 0.0], [-0.8, 0.02, 0.0]], [at("kill", 0.0, "a-1")], ticks=60)
+    truths = truths_of([[-1.0, 0.0, 0.0], [-0.8, 0.02, 0.0]], [at("kill", 0.0, "a-1")], ticks=60)
     alone = truths_of([[-1.0, 0.0, 0.0], [-0.8, 1.0, 0.0]], [], ticks=60)
-    assert sum(truth.contact_onsets[0, 0] for truth in seen) >= 1
-    assert seen[-1].pose[0, 0] < alone[-1].pose[0, 0]
-    assert max(np.hypot(*truth.velocity[1, :2]) for truth in seen) < 0.11
+    assert sum(truth.contact_onsets[0, 0] for truth in truths) >= 1
+    assert truths[-1].pose[0, 0] < alone[-1].pose[0, 0]
+    assert max(np.hypot(*truth.velocity[1, :2]) for truth in truths) < 0.11
 
 
 def test_overlapping_kills_last_until_all_ended_or_a_revive():
     twice = [at("kill", 0.2, "a-0", for_s=0.3), at("kill", 0.3, "a-0", for_s=1.0)]
     assert [not truth.alive[0] for truth in truths_of(TWO, twice, 20)] == [2 <= tick < 13 for tick in range(20)]
     lifted = [*twice, at("revive", 0.8, "a-0")]
-    seen = truths_of(TWO, lifted, 20)
-    assert [not truth.alive[0] for truth in seen] == [2 <= tick < 8 for tick in range(20)]
-    events = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in seen for e in truth.events]
+    truths = truths_of(TWO, lifted, 20)
+    assert [not truth.alive[0] for truth in truths] == [2 <= tick < 8 for tick in range(20)]
+    events = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in truths for e in truth.events]
     assert events == [
         (2, "kill", False, [True, False]),
         (3, "kill", False, [False, False]),
@@ -121,13 +121,13 @@ def test_overlapping_kills_last_until_all_ended_or_a_revive():
 
 
 def test_events_end_before_others_begin_at_the_same_time():
-    seen = truths_of(
+    truths = truths_of(
         TWO, [at("kill", 0.2, "a-0", for_s=0.3), at("kill", 0.5, "a-0"), at("kill", 0.31, "a-1", for_s=0.02)], 9
     )
-    assert [e.changed.tolist() for e in seen[5].events] == [[True, False], [True, False]]
-    assert [not truth.alive[0] for truth in seen] == [tick >= 2 for tick in range(9)]
-    assert [(e.ended, e.changed.tolist()) for e in seen[4].events] == [(False, [False, True]), (True, [False, True])]
-    assert all(truth.alive[1] for truth in seen)
+    assert [e.changed.tolist() for e in truths[5].events] == [[True, False], [True, False]]
+    assert [not truth.alive[0] for truth in truths] == [tick >= 2 for tick in range(9)]
+    assert [(e.ended, e.changed.tolist()) for e in truths[4].events] == [(False, [False, True]), (True, [False, True])]
+    assert all(truth.alive[1] for truth in truths)
 
 
 def test_radio_graph_excludes_dead_disabled_and_partitioned_pairs():
@@ -151,10 +151,10 @@ def test_radio_graph_excludes_dead_disabled_and_partitioned_pairs():
 def test_ramp_changes_the_radio_range_tick_by_tick():
     """Robots 1 m apart; the range falls from 9 m at 0.2 s to 0.5 m at 1.2 s, and is 9 m again at 1.5 s."""
     ramp = {"do": "ramp", "at_s": 0.2, "what": "radio.range_m", "to": 0.5, "over_s": 1.0, "for_s": 1.3}
-    seen = truths_of(TWO, [ramp], 20)
-    joined = [truth.edges is not None and len(truth.edges) == 1 for truth in seen]
+    truths = truths_of(TWO, [ramp], 20)
+    joined = [truth.edges is not None and len(truth.edges) == 1 for truth in truths]
     assert joined == [not 12 <= tick < 15 for tick in range(20)]
-    events = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in seen for e in truth.events]
+    events = [(truth.tick, e.do, e.ended, e.changed.tolist()) for truth in truths for e in truth.events]
     assert events == [(2, "ramp", False, [True, True]), (15, "ramp", True, [True, True])]
 
 
@@ -179,8 +179,8 @@ def test_partition_by_position_uses_the_positions_at_its_begin():
     """Robot 0 drives across the middle before the second partition begins."""
     halves = {"do": "partition", "halves": "x"}
     events = [{**halves, "at_s": 0.1, "for_s": 1.0}, {**halves, "at_s": 4.0}]
-    seen = truths_of([[-0.05, 0.0, 0.0], [-0.5, 1.0, 0.0]], events, 42)
-    joined = [truth.edges is not None and len(truth.edges) == 1 for truth in seen]
+    truths = truths_of([[-0.05, 0.0, 0.0], [-0.5, 1.0, 0.0]], events, 42)
+    joined = [truth.edges is not None and len(truth.edges) == 1 for truth in truths]
     assert joined == [tick < 40 for tick in range(42)]
 
 
@@ -245,14 +245,14 @@ def pushed(
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_impulse_sets_a_velocity_that_motors_brake(engine):
-    seen = pushed([[0.0, 0.0, 0.3], [1.0, 0.0, 0.0]], engine, direction_rad=np.pi / 2).seen
-    assert np.allclose(seen[1].velocity, 0.0)
-    assert np.allclose(seen[2].velocity[0], [0.0, 0.4, 0.0], atol=1e-12)
-    assert not seen[2].velocity[1].any()
-    [happened] = seen[2].events
+    truths = pushed([[0.0, 0.0, 0.3], [1.0, 0.0, 0.0]], engine, direction_rad=np.pi / 2).truths
+    assert np.allclose(truths[1].velocity, 0.0)
+    assert np.allclose(truths[2].velocity[0], [0.0, 0.4, 0.0], atol=1e-12)
+    assert not truths[2].velocity[1].any()
+    [happened] = truths[2].events
     assert (happened.do, happened.ended, happened.changed.tolist()) == ("impulse", False, [True, False])
-    assert seen[-1].pose[0, 1] > 0.0005
-    assert np.allclose(seen[-1].velocity, 0.0, atol=1e-9)
+    assert truths[-1].pose[0, 1] > 0.0005
+    assert np.allclose(truths[-1].velocity, 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -265,18 +265,18 @@ def test_impulses_of_one_tick_add_up_for_all_robots_of_a_group(engine):
     scenario = posed(poses, "footbot", events=events, physics={"engine": engine})
     watch = Watch()
     Loop(World(scenario, [1], {}), None, ForwardBackend(0.0), [watch], scenario.events).run(1)
-    assert np.allclose(watch.seen[0].velocity, [[0.2, 0.0, 0.0]] * 2)
+    assert np.allclose(watch.truths[0].velocity, [[0.2, 0.0, 0.0]] * 2)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_impulse_at_its_limit_passes_no_wall_and_no_robot(engine):
     """The limit is a radius per physics step: 0.085 m in 0.02 s."""
-    seen = pushed([[1.8, 0.0, 0.0], [1.0, 0.0, 0.0]], engine, speed_mps=4.25).seen
-    assert max(truth.pose[0, 0] for truth in seen) < 2.0
-    assert sum(truth.contact_onsets[0, 1] for truth in seen) >= 1
-    seen = pushed([[-1.0, 0.0, 0.0], [-0.8, 0.0, 0.0]], engine, speed_mps=4.25).seen
-    assert all(truth.pose[0, 0] < truth.pose[1, 0] for truth in seen)
-    assert sum(truth.contact_onsets[0, 0] for truth in seen) >= 1
+    truths = pushed([[1.8, 0.0, 0.0], [1.0, 0.0, 0.0]], engine, speed_mps=4.25).truths
+    assert max(truth.pose[0, 0] for truth in truths) < 2.0
+    assert sum(truth.contact_onsets[0, 1] for truth in truths) >= 1
+    truths = pushed([[-1.0, 0.0, 0.0], [-0.8, 0.0, 0.0]], engine, speed_mps=4.25).truths
+    assert all(truth.pose[0, 0] < truth.pose[1, 0] for truth in truths)
+    assert sum(truth.contact_onsets[0, 0] for truth in truths) >= 1
 
 
 def test_impulse_is_equal_for_an_arena_alone_and_among_others():
@@ -309,4 +309,4 @@ def test_impulse_acts_only_in_the_engine_with_forces():
     world, watch = World(scenario, [1], {}), Watch()
     assert set(world.engines) == {"discs", "kinematic"}
     Loop(world, None, ForwardBackend(0.0), [watch], scenario.events, live_events=LiveEvents(scenario, {})).run(2)
-    assert watch.seen[0].velocity[:, 0].tolist() == [0.4 if row == 2 else 0.0 for row in range(15)]
+    assert watch.truths[0].velocity[:, 0].tolist() == [0.4 if row == 2 else 0.0 for row in range(15)]

@@ -227,14 +227,14 @@ def test_jammer_is_on_for_its_duty_and_toggles_at_both_ends(duty: float):
     jammers = started_jammers(jammer(at=(0.0, 0.0), duty=duty, period_s=0.0007))
     assert jammers.duty == pytest.approx([duty] * 2, abs=1e-6)
     at_ns = np.arange(0, 2_000_000, 400)
-    seen = np.array([jammers.is_on(time_ns) for time_ns in at_ns.tolist()])
-    assert seen.mean(axis=0) == pytest.approx([duty] * 2, abs=0.15)
+    is_on = np.array([jammers.is_on(time_ns) for time_ns in at_ns.tolist()])
+    assert is_on.mean(axis=0) == pytest.approx([duty] * 2, abs=0.15)
     now = jammers.is_on(-1)
     toggled, which = jammers.toggles(0, 2_000_000)
     assert (np.diff(toggled) >= 0).all()
     for i, time_ns in enumerate(at_ns.tolist()):
         flips = np.bincount(which[toggled <= time_ns], minlength=2)
-        np.testing.assert_array_equal(now ^ (flips % 2 == 1), seen[i])
+        np.testing.assert_array_equal(now ^ (flips % 2 == 1), is_on[i])
 
 
 def test_jammer_toggles_are_the_same_in_steps_and_at_once():

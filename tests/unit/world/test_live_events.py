@@ -31,10 +31,10 @@ def test_live_events_are_numbered_and_happen_at_the_next_tick():
     live = live_events(record=recorded.append)
     assert live.pop_due(3, RATE_HZ) == []
     assert (live.submit(KILL), live.submit(SET)) == (2, 3)
-    taken = live.pop_due(4, RATE_HZ)
-    assert [number for number, _ in taken] == [2, 3]
-    assert isinstance(taken[0][1], Kill)
-    assert taken[0][1].at_s == 0.4
+    due = live.pop_due(4, RATE_HZ)
+    assert [number for number, _ in due] == [2, 3]
+    assert isinstance(due[0][1], Kill)
+    assert due[0][1].at_s == 0.4
     assert recorded == [LiveEvent(4, 2, KILL), LiveEvent(4, 3, SET)]
     assert live.pop_due(5, RATE_HZ) == []
 

@@ -205,12 +205,12 @@ class Tallies(Observer):
 @pytest.mark.parametrize("invalid_to", [99, 0, NOWHERE - 1], ids=["no robot", "the sender", "below all sentinels"])
 def test_loop_counts_packets_of_subticks_and_invalid_receivers(invalid_to: int):
     scenario = scenario_from(SAMPLE, "sample")
-    world, backend, seen = World(scenario, [1], {}), Sender(invalid_to), Tallies()
-    loop = Loop(world, new_medium(scenario, world, None), backend, [seen], timed=backend)
+    world, backend, tally = World(scenario, [1], {}), Sender(invalid_to), Tallies()
+    loop = Loop(world, new_medium(scenario, world, None), backend, [tally], timed=backend)
     loop.run(5)
     last = loop.end()
     assert last is not None
-    total = sum(seen.tallies, last)
+    total = sum(tally.tallies, last)
     assert int(total.sent.sum()) == 10
     assert total.fates.sum() == total.intended.sum()
     assert loop.counts()["packets_to_nobody"] == 5
@@ -244,12 +244,12 @@ class FromBoth(Sender):
 
 def test_packets_of_an_arena_that_leaves_are_counted_or_in_flight():
     scenario = scenario_from(SAMPLE, "sample")
-    world, backend, seen = World(scenario, [1, 2], {}), FromBoth(), Tallies()
-    loop = Loop(world, new_medium(scenario, world, None), backend, [seen], stop_conditions=OverAfter(3), timed=backend)
+    world, backend, tally = World(scenario, [1, 2], {}), FromBoth(), Tallies()
+    loop = Loop(world, new_medium(scenario, world, None), backend, [tally], stop_conditions=OverAfter(3), timed=backend)
     loop.run(6)
     last = loop.end()
     assert last is not None
-    total = sum(seen.tallies, last)
+    total = sum(tally.tallies, last)
     assert total.sent.tolist() == [12, 6]
     assert total.fates.sum(axis=1).tolist() == total.intended.tolist()
     assert loop.arena_ticks.tolist() == [6, 3]

@@ -33,8 +33,8 @@ def test_expectation_of_a_campaign_is_checked_at_each_point_by_its_interval(tmp_
 def test_expectation_in_a_share_of_runs_uses_wilsons_lower_end(tmp_path, times_s):
     values = iter(times_s)
     folder = write_campaign(tmp_path / "a", {"radio.loss": [0.0]}, times={"found_s": lambda *_: next(values)})
-    found = sum(time_s is not None for time_s in times_s)
-    low = binomtest(found, 10).proportion_ci(0.95, method="wilson").low
+    successes = sum(time_s is not None for time_s in times_s)
+    low = binomtest(successes, 10).proportion_ci(0.95, method="wilson").low
     below, above = (f"found_s <= 60 in {100 * (low + change):.3f} % of runs" for change in (-0.001, 0.001))
     assert are_met(folder, below, above) == [True, False]
 

@@ -62,9 +62,9 @@ def test_misspelt_response_suggests_the_metric(tmp_path, name, column):
 
 
 def test_parts_give_the_same_rows_as_the_whole(tmp_path):
-    whole = CampaignFolder(write_campaign(tmp_path / "whole"))
+    joined = CampaignFolder(write_campaign(tmp_path / "whole"))
     parts = CampaignFolder(write_campaign(tmp_path / "parts", parts=3))
-    assert parts.runs.equals(whole.runs)
+    assert parts.runs.equals(joined.runs)
     assert parts.finished
 
 
@@ -146,8 +146,8 @@ def test_statistics_go_by_column_and_stat(tmp_path, name, means):
 
 @pytest.mark.parametrize("stat", get_args(Stat))
 def test_time_response_has_every_statistic(tmp_path, stat):
-    found = CampaignFolder(write_campaign(tmp_path / "a")).statistic(f"aggregation_time_s.{stat}")
-    assert (found.response.kind, found.stat) == ("time", stat)
+    statistic = CampaignFolder(write_campaign(tmp_path / "a")).statistic(f"aggregation_time_s.{stat}")
+    assert (statistic.response.kind, statistic.stat) == ("time", stat)
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_damaged_table_of_a_campaign_is_refused_when_it_is_read(tmp_path):
 def test_hold_of_a_time_response_shortens_its_observation_in_a_sample(tmp_path):
     folder = write_campaign(tmp_path / "a")
     responses = json.loads((folder / "campaign.json").read_text())["responses"]
-    held = [of | {"hold_s": 5.0} if of["column"] == "aggregation_time_s" else of for of in responses]
+    held = [row | {"hold_s": 5.0} if row["column"] == "aggregation_time_s" else row for row in responses]
     before = CampaignFolder(folder).sample("aggregation_time_s", 2)
     after = CampaignFolder(rewritten(folder, responses=held)).sample("aggregation_time_s", 2)
     assert not before.observed.all()
@@ -245,13 +245,13 @@ def compared(first, second, *responses):
 
 
 def test_points_that_both_have_meet_whatever_their_order(plain, better):
-    found = compared(plain, better, "order")
-    assert [(row.first_point["radio.loss"], row.second_point["radio.loss"]) for row in found.rows] == [
+    comparison = compared(plain, better, "order")
+    assert [(row.first_point["radio.loss"], row.second_point["radio.loss"]) for row in comparison.rows] == [
         (0.2, 0.2),
         (0.4, 0.4),
     ]
-    assert found.paths == ("radio.loss",)
-    for row in found.rows:
+    assert comparison.paths == ("radio.loss",)
+    for row in comparison.rows:
         assert row.difference.pairs == 10
         assert row.difference.median == pytest.approx(0.1, abs=0.06)
         assert row.difference.delta > 0.5
@@ -280,20 +280,20 @@ def test_response_without_values_is_compared_only_if_named(tmp_path, plain):
 
 
 def test_selected_points_of_one_campaign_are_compared(plain):
-    found = compared(f"{plain}@radio.loss=0", f"{plain}@radio.loss=0.4", "order.final")
-    assert found.paths == ()
-    (row,) = found.rows
+    comparison = compared(f"{plain}@radio.loss=0", f"{plain}@radio.loss=0.4", "order.final")
+    assert comparison.paths == ()
+    (row,) = comparison.rows
     assert (row.first_point["radio.loss"], row.second_point["radio.loss"]) == (0.0, 0.4)
     assert row.difference.median < -0.15
-    assert cells(found, row)[1] == "A: radio.loss=0; B: radio.loss=0.4"
+    assert cells(comparison, row)[1] == "A: radio.loss=0; B: radio.loss=0.4"
 
 
 def test_parameter_that_one_campaign_alone_varies_stands_in_its_label(tmp_path, plain):
     both = write_campaign(tmp_path / "both", TWO)
-    found = compared(both, f"{plain}@radio.loss=0", "order")
-    assert cells(found, found.rows[0])[1] == "A: radio.loss=0, physics.engine=discs; B: radio.loss=0"
-    found = compared(both, plain, "order")
-    assert [cells(found, row)[1] for row in found.rows] == [
+    comparison = compared(both, f"{plain}@radio.loss=0", "order")
+    assert cells(comparison, comparison.rows[0])[1] == "A: radio.loss=0, physics.engine=discs; B: radio.loss=0"
+    comparison = compared(both, plain, "order")
+    assert [cells(comparison, row)[1] for row in comparison.rows] == [
         "radio.loss=0; A: physics.engine=discs",
         "radio.loss=0; A: physics.engine=pymunk",
     ]
@@ -302,26 +302,26 @@ def test_parameter_that_one_campaign_alone_varies_stands_in_its_label(tmp_path, 
 
 def test_campaigns_that_vary_nothing_have_one_point(tmp_path):
     folders = [write_campaign(tmp_path / name, {}, points=[{}]) for name in "ab"]
-    found = compared(*folders, "order")
-    assert [cells(found, row)[1] for row in found.rows] == ["all"]
+    comparison = compared(*folders, "order")
+    assert [cells(comparison, row)[1] for row in comparison.rows] == ["all"]
 
 
 def test_comparison_notes_count_runs_failed_and_missing(tmp_path, plain):
     part = write_campaign(tmp_path / "part", failed=(0, 1), missing=(25,), parts=1)
-    found = compared(plain, part)
-    told = "\n".join(notes(found))
-    assert all(text in told for text in (f"A: {plain} (30 ", f"B: {part} (", "29 of 30", "2 failed", "95 %"))
-    assert [len(cells(found, row)) for row in found.rows] == [len(COLUMNS)] * 9
-    assert cells(found, found.rows[0])[-1] == "8"
+    comparison = compared(plain, part)
+    lines = "\n".join(notes(comparison))
+    assert all(text in lines for text in (f"A: {plain} (30 ", f"B: {part} (", "29 of 30", "2 failed", "95 %"))
+    assert [len(cells(comparison, row)) for row in comparison.rows] == [len(COLUMNS)] * 9
+    assert cells(comparison, comparison.rows[0])[-1] == "8"
 
 
 def test_times_of_runs_that_a_stop_condition_ended_are_warned_of(tmp_path, plain):
     times = {"slow_s": lambda *_: 60.0}
-    cut, whole = (
+    cut, full = (
         write_campaign(tmp_path / name, times=times, stopped=stopped)
         for name, stopped in (("cut", {0: 8.5, 11: 30.0}), ("whole", None))
     )
-    warned = [line for line in notes(compared(cut, whole, "slow_s")) if line.startswith("slow_s:")]
+    warned = [line for line in notes(compared(cut, full, "slow_s")) if line.startswith("slow_s:")]
     assert len(warned) == 1
     assert "2 of 60" in warned[0]
     assert "8.5 s" in warned[0]
@@ -333,11 +333,11 @@ def test_discrete_outcomes_are_compared_by_their_means(tmp_path):
         write_campaign(tmp_path / str(share), numbers={"groups.final": lambda _, rng, p=share: float(rng.random() < p)})
         for share in (0.1, 0.4)
     )
-    found = compared(one, other, "groups")
-    row = found.rows[0]
-    assert cells(found, row)[4].endswith("(mean)")
-    assert float(cells(found, row)[4].split()[0]) == pytest.approx(row.difference.mean, abs=0.005)
-    assert any(line.startswith("(mean)") for line in notes(found))
+    comparison = compared(one, other, "groups")
+    row = comparison.rows[0]
+    assert cells(comparison, row)[4].endswith("(mean)")
+    assert float(cells(comparison, row)[4].split()[0]) == pytest.approx(row.difference.mean, abs=0.005)
+    assert any(line.startswith("(mean)") for line in notes(comparison))
 
 
 @pytest.mark.parametrize(("rare", "is_skewed"), [(29, True), (15, False)])
@@ -356,34 +356,34 @@ def test_medians_of_another_sign_than_the_difference_are_noted(tmp_path):
     values = {"a": iter([0.0, 10.0, 11.0]), "b": iter([1.0, 9.5, 12.0])}
     one, other = (
         write_campaign(
-            tmp_path / name, {}, points=[{}], seeds=(1, 2, 3), numbers={"gap_m.final": lambda *_, of=of: next(of)}
+            tmp_path / name, {}, points=[{}], seeds=(1, 2, 3), numbers={"gap_m.final": lambda *_, gaps=gaps: next(gaps)}
         )
-        for name, of in values.items()
+        for name, gaps in values.items()
     )
-    found = compared(one, other, "gap_m")
-    assert any(line.startswith("gap_m.final at all") and "sign" in line for line in notes(found))
+    comparison = compared(one, other, "gap_m")
+    assert any(line.startswith("gap_m.final at all") and "sign" in line for line in notes(comparison))
 
 
 def test_samples_without_a_seed_in_common_are_said_to_be(tmp_path, plain):
     other = write_campaign(tmp_path / "other", seeds=range(50, 60))
-    found = compared(f"{plain}@radio.loss=0", f"{other}@radio.loss=0", "aggregation_time_s", "order")
-    assert [cells(found, row)[-1] for row in found.rows] == ["none (10, 10)"] * 2
-    assert [row.difference.test for row in found.rows] == ["log-rank", "Mann-Whitney"]
+    comparison = compared(f"{plain}@radio.loss=0", f"{other}@radio.loss=0", "aggregation_time_s", "order")
+    assert [cells(comparison, row)[-1] for row in comparison.rows] == ["none (10, 10)"] * 2
+    assert [row.difference.test for row in comparison.rows] == ["log-rank", "Mann-Whitney"]
 
 
 def test_comparison_csv_has_the_numbers_of_the_rows(tmp_path, plain, better):
     never = write_campaign(tmp_path / "never", times={"aggregation_time_s": lambda *_: None})
-    found = compared(never, better)
-    write_comparison(found, tmp_path / "x.csv")
+    comparison = compared(never, better)
+    write_comparison(comparison, tmp_path / "x.csv")
     rows = list(csv.DictReader((tmp_path / "x.csv").read_text().splitlines()))
-    assert len(rows) == len(found.rows)
+    assert len(rows) == len(comparison.rows)
     assert rows[0]["response"] == "order.final"
-    assert float(rows[0]["median_difference"]) == found.rows[0].difference.median
+    assert float(rows[0]["median_difference"]) == comparison.rows[0].difference.median
     assert rows[0]["a.radio.loss"] == rows[0]["b.radio.loss"] == "0.2"
     last = rows[-1]
     assert (last["kind"], last["a_censored"], last["a_q50"], last["a_limit"]) == ("time", "1.0", "", "100.0")
     assert last["median_difference_low"] == "-inf"
-    assert math.isnan(found.rows[-1].first.q50)
+    assert math.isnan(comparison.rows[-1].first.q50)
 
 
 @pytest.mark.parametrize("name", ["x.txt", "nowhere/x.csv"])

@@ -20,36 +20,36 @@ NAMES = ("a-0", "a-1", "a-2")
 
 def table(*rows: dict[str, object]) -> pl.DataFrame:
     usual = {"arena": 0, "sender": 0, "receivers": 1, "sequence": 0, "size_bytes": 4, "topic": "Beacon"}
-    whole = [{**dict.fromkeys(PacketsTable.types), **usual, **row} for row in rows]
-    return pl.DataFrame(whole, schema=PacketsTable.types)
+    packets = [{**dict.fromkeys(PacketsTable.types), **usual, **row} for row in rows]
+    return pl.DataFrame(packets, schema=PacketsTable.types)
 
 
 def test_packet_is_one_frame_with_its_fate_at_each_receiver():
     one = {"on_air_at_ns": 70, "payload": b"told"}
-    seen = table(
+    packets = table(
         {**one, "receiver": 2, "fate": "collided", "rssi_dbm": -80.0},
         {**one, "receiver": 1, "fate": "received", "rssi_dbm": -61.5},
         {"sequence": 1, "receiver": None, "fate": "channel_busy", "on_air_at_ns": 90},
     )
-    told = ("a-0 to all: Beacon, packet 0", "received: a-1 -61.5 dBm", "collided: a-2 -80.0 dBm")
-    assert list(frames_on_air(seen, NAMES)) == [CapturedFrame(70, 0, None, 0, 4, b"told", -61.5, told)]
+    comments = ("a-0 to all: Beacon, packet 0", "received: a-1 -61.5 dBm", "collided: a-2 -80.0 dBm")
+    assert list(frames_on_air(packets, NAMES)) == [CapturedFrame(70, 0, None, 0, 4, b"told", -61.5, comments)]
 
 
 def test_frames_are_in_the_order_of_time_and_addressed_ones_say_to_whom():
-    seen = table(
+    packets = table(
         {"sequence": 7, "receiver": 1, "to": 1, "fate": "lost", "on_air_at_ns": 5},
         {"sender": 2, "receiver": 0, "fate": "received", "on_air_at_ns": 3},
         {"sender": 1, "receiver": 0, "fate": "received", "on_air_at_ns": 3},
     )
-    found = list(frames_on_air(seen, NAMES))
-    assert [(frame.on_air_at_ns, frame.sender, frame.to) for frame in found] == [(3, 1, None), (3, 2, None), (5, 0, 1)]
-    assert found[2].comments == ("a-0 to a-1: Beacon, packet 7", "lost: a-1")
-    assert (found[2].payload, found[2].rssi_dbm) == (b"", None)
+    frames = list(frames_on_air(packets, NAMES))
+    assert [(frame.on_air_at_ns, frame.sender, frame.to) for frame in frames] == [(3, 1, None), (3, 2, None), (5, 0, 1)]
+    assert frames[2].comments == ("a-0 to a-1: Beacon, packet 7", "lost: a-1")
+    assert (frames[2].payload, frames[2].rssi_dbm) == (b"", None)
 
 
 def header(radio: Radio, **fields: Any) -> str:
-    known: dict[str, Any] = {"on_air_at_ns": 0, "sender": 0x17, "to": None, "sequence": 0x1234, "size_bytes": 6}
-    return link_of(radio).header(CapturedFrame(**{**known, **fields})).hex()
+    usual: dict[str, Any] = {"on_air_at_ns": 0, "sender": 0x17, "to": None, "sequence": 0x1234, "size_bytes": 6}
+    return link_of(radio).header(CapturedFrame(**{**usual, **fields})).hex()
 
 
 def joined(*parts: str) -> str:
@@ -73,11 +73,11 @@ def test_ieee_802_15_4_has_a_tap_header_and_short_addresses():
 
 @pytest.mark.parametrize(("frequency_hz", "channel"), [(2.405e9, "0b00"), (2.480e9, "1a00"), (868.3e6, None)])
 def test_channel_is_written_only_for_bands_that_have_channels(frequency_hz: float, channel: str | None):
-    found = header(radio_of({"preset": "ieee802154", "frequency_hz": frequency_hz}))
+    text = header(radio_of({"preset": "ieee802154", "frequency_hz": frequency_hz}))
     if channel is None:
-        assert found.startswith(joined("00 00 1400", FCS_NONE, RATE, "4188"))
+        assert text.startswith(joined("00 00 1400", FCS_NONE, RATE, "4188"))
     else:
-        assert joined("0300 0300", channel, "00 00") in found
+        assert joined("0300 0300", channel, "00 00") in text
 
 
 def test_ieee_802_11_has_a_radiotap_header_and_udp():
@@ -108,9 +108,9 @@ def test_ieee_802_11n_frame_has_its_mcs_and_qos_control():
 
 @pytest.mark.parametrize(("preset", "duration_us"), [("wifi-b-1M", 10 + 192 + 112), ("wifi-a-6M", 16 + 44)])
 def test_addressed_wifi_frame_reserves_the_air_for_its_acknowledgement(preset: str, duration_us: int):
-    found = bytes.fromhex(header(radio_of({"preset": preset}), to=2))
-    assert found[14:24] == struct.pack("<HH", 8, duration_us) + bytes.fromhex("025357000003")
-    words = struct.unpack(">10H", found[14 + 24 + 8 :][:20])
+    data = bytes.fromhex(header(radio_of({"preset": preset}), to=2))
+    assert data[14:24] == struct.pack("<HH", 8, duration_us) + bytes.fromhex("025357000003")
+    words = struct.unpack(">10H", data[14 + 24 + 8 :][:20])
     assert sum(words) % 0xFFFF == 0
 
 
@@ -173,9 +173,9 @@ def test_capture_is_read_back_as_written(tmp_path_factory, packets: list[Capture
     path = tmp_path_factory.mktemp("capture") / "some.pcapng"
     blocks = [packet(one.at_ns, one.data, one.length, one.comments) for one in packets]
     path.write_bytes(section("s") + interface(147, "n", "d") + b"".join(blocks))
-    found = read(path)
-    assert (found.section, found.interface) == ({4: [b"s"]}, {2: [b"n"], 3: [b"d"], 9: [b"\x09"]})
-    assert (found.link_type, found.packets) == (147, packets)
+    capture = read(path)
+    assert (capture.section, capture.interface) == ({4: [b"s"]}, {2: [b"n"], 3: [b"d"], 9: [b"\x09"]})
+    assert (capture.link_type, capture.packets) == (147, packets)
 
 
 def test_comment_too_long_for_an_option_is_cut_between_characters(tmp_path):

@@ -20,9 +20,9 @@ from swarmwire.metrics.measures.network.fragmentation import (
 from tests.support.metrics.truths import edges, in_each_tick, measured, static, truth, watch
 
 
-def components(of, **given_fields):
-    seen = truth(of, **given_fields)
-    return measured("components", of, seen), measured("largest_component", of, seen)
+def components(run, **given_fields):
+    tick = truth(run, **given_fields)
+    return measured("components", run, tick), measured("largest_component", run, tick)
 
 
 @given(st.lists(st.tuples(st.integers(0, 11), st.integers(0, 11)), max_size=30))
@@ -68,49 +68,49 @@ def brute_force(pairs, alive):
 def graphs(draw):
     """Some arenas of the same number of robots: of each who is alive, and edges among them."""
     robots, arenas = draw(st.integers(1, 9)), draw(st.integers(1, 3))
-    found = []
+    states = []
     for _ in range(arenas):
         alive = draw(st.lists(st.booleans() | st.just(True), min_size=robots, max_size=robots))
         every = [(a, b) for a in range(robots) for b in range(a + 1, robots) if alive[a] and alive[b]]
-        found.append((alive, sorted(draw(st.lists(st.sampled_from(every), unique=True))) if every else []))
-    return robots, found
+        states.append((alive, sorted(draw(st.lists(st.sampled_from(every), unique=True))) if every else []))
+    return robots, states
 
 
 @settings(max_examples=60)
 @given(graphs())
 def test_connectivity_is_that_of_each_arenas_robots_alive(drawn):
     robots, arenas = drawn
-    of = static(robots, arenas=len(arenas))
+    run = static(robots, arenas=len(arenas))
     alive = np.array([one for own, _ in arenas for one in own])
     pairs = edges(*((i * robots + a, i * robots + b) for i, (_, own) in enumerate(arenas) for a, b in own))
     expected = [brute_force(own, living) for living, own in arenas]
-    assert measured(CONNECTIVITY, of, truth(of, alive=alive, edges=pairs)) == pytest.approx(
+    assert measured(CONNECTIVITY, run, truth(run, alive=alive, edges=pairs)) == pytest.approx(
         expected, abs=1e-8, nan_ok=True
     )
 
 
 def test_connectivity_of_a_large_swarm_is_the_same_dense_and_sparse():
-    of, rng = static(130), np.random.default_rng(4)
-    place = rng.uniform(0, np.sqrt(130), (130, 2))
-    near = np.argwhere(np.hypot(*(place[:, None] - place[None]).transpose(2, 0, 1)) < 2.0)
+    run, rng = static(130), np.random.default_rng(4)
+    position = rng.uniform(0, np.sqrt(130), (130, 2))
+    near = np.argwhere(np.hypot(*(position[:, None] - position[None]).transpose(2, 0, 1)) < 2.0)
     pairs = near[near[:, 0] < near[:, 1]]
-    [found] = measured(CONNECTIVITY, of, truth(of, edges=pairs))
-    assert found == pytest.approx(brute_force(pairs, np.ones(130, np.bool_)), abs=1e-8)
-    assert found == second_eigenvalue(pairs, 130, max_dense=130)
-    assert found > 0.01
+    [connectivity] = measured(CONNECTIVITY, run, truth(run, edges=pairs))
+    assert connectivity == pytest.approx(brute_force(pairs, np.ones(130, np.bool_)), abs=1e-8)
+    assert connectivity == second_eigenvalue(pairs, 130, max_dense=130)
+    assert connectivity > 0.01
 
 
 def test_connectivity_is_held_between_its_samples():
-    of = static(3)
-    ticks = (truth(of, tick, edges=edges((0, 1), (1, 2)) if tick < 1 else edges()) for tick in range(4))
-    assert in_each_tick(of, ticks, AlgebraicConnectivity(every_s=0.2)).ravel().tolist() == [1.0, 1.0, 0.0, 0.0]
+    run = static(3)
+    ticks = (truth(run, tick, edges=edges((0, 1), (1, 2)) if tick < 1 else edges()) for tick in range(4))
+    assert in_each_tick(run, ticks, AlgebraicConnectivity(every_s=0.2)).ravel().tolist() == [1.0, 1.0, 0.0, 0.0]
 
 
 NAME = "articulation"
 
 
-def points(of, pairs, **fields):
-    return measured(NAME, of, truth(of, edges=edges(*pairs), **fields))
+def points(run, pairs, **fields):
+    return measured(NAME, run, truth(run, edges=edges(*pairs), **fields))
 
 
 def pieces(nodes, pairs):
@@ -127,9 +127,9 @@ def test_articulation_points_are_those_without_which_there_are_more_pieces(drawn
     arenas = [sorted({(min(pair), max(pair)) for pair in own if pair[0] != pair[1]}) for own in drawn]
     expected = []
     for own in arenas:
-        whole = pieces(range(8), own)
+        total = pieces(range(8), own)
         # A robot that stood alone takes its own piece with it.
-        expected.append(sum(pieces(set(range(8)) - {robot}, own) > whole for robot in range(8)))
+        expected.append(sum(pieces(set(range(8)) - {robot}, own) > total for robot in range(8)))
     pairs = [(8 * i + a, 8 * i + b) for i, own in enumerate(arenas) for a, b in own]
     assert points(static(8, arenas=len(arenas)), pairs) == expected
 
@@ -150,28 +150,28 @@ WHOLE, SPLIT = edges((0, 1)), edges()
 
 def events_of(ticks, hold):
     """The length of each event in ticks, of a string as `seen_ticks` takes it; None: open at the end."""
-    whole = [tick for tick, shown in enumerate(ticks) if shown == "+"]
-    found = []
-    for this, following in zip(whole, [*whole[1:], None], strict=False):
+    connected = [tick for tick, shown in enumerate(ticks) if shown == "+"]
+    times = []
+    for this, following in zip(connected, [*connected[1:], None], strict=False):
         apart = [tick for tick in range(this, following or len(ticks)) if ticks[tick] == "-"]
         if apart and apart[-1] - apart[0] >= hold:
-            found.append(following - apart[0] if following else None)
-    return found
+            times.append(following - apart[0] if following else None)
+    return times
 
 
-def seen_ticks(of, ticks):
+def seen_ticks(run, ticks):
     """Of one arena with two robots: + joined, - apart, 0 all dead; at 10 ticks per second."""
     for tick, shown in enumerate(ticks):
-        yield truth(of, tick, edges=WHOLE if shown == "+" else SPLIT, alive=np.full(2, shown != "0"))
+        yield truth(run, tick, edges=WHOLE if shown == "+" else SPLIT, alive=np.full(2, shown != "0"))
 
 
 def finals(ticks, hold_s=None):
     """What the four metrics say in the end of ticks as `seen_ticks` takes them."""
-    of = static(2)
+    run = static(2)
     metrics = Metrics(list(NAMES) if hold_s is None else [kind(hold_s=hold_s) for kind in KINDS])
-    watch(of, seen_ticks(of, ticks), metrics)
-    [found] = metrics.end(None)["metrics"]
-    return tuple(found[name]["final"] for name in NAMES)
+    watch(run, seen_ticks(run, ticks), metrics)
+    [summary] = metrics.end(None)["metrics"]
+    return tuple(summary[name]["final"] for name in NAMES)
 
 
 NO_EVENT = (0.0, None, None, None)
@@ -212,13 +212,13 @@ def test_events_are_those_read_off_the_ticks(ticks, hold):
 
 @given(st.text("+++-----0", min_size=1, max_size=60), st.integers(0, 4))
 def test_fragmented_is_the_share_of_the_time_in_events_without_their_holds(ticks, hold):
-    of = static(2)
-    found = in_each_tick(of, seen_ticks(of, ticks), Fragmented(hold_s=hold / 10)).ravel().tolist()
-    assert set(found) <= {0.0, 1.0}
-    starts = [tick for tick, (before, now) in enumerate(zip([0.0, *found], found, strict=False)) if now > before]
+    run = static(2)
+    values = in_each_tick(run, seen_ticks(run, ticks), Fragmented(hold_s=hold / 10)).ravel().tolist()
+    assert set(values) <= {0.0, 1.0}
+    starts = [tick for tick, (before, now) in enumerate(zip([0.0, *values], values, strict=False)) if now > before]
     lengths = events_of(ticks, hold)
     assert len(starts) == len(lengths)
     closed = sum(length - hold for length in lengths if length is not None)
     still_open = len(ticks) - starts[-1] if lengths and lengths[-1] is None else 0
     # Who all died within the hold is counted at the first split tick after it, which is later than the hold.
-    assert sum(found) == closed + still_open if "0" not in ticks else sum(found) <= closed + still_open
+    assert sum(values) == closed + still_open if "0" not in ticks else sum(values) <= closed + still_open

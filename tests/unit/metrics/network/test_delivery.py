@@ -20,9 +20,9 @@ from tests.support.metrics.recorded import links
 from tests.support.metrics.truths import departed, finished, static, tally, truth, watch
 
 
-def tallied(of, *ticks, last=None):
+def tallied(run, *ticks, last=None):
     observer = RadioTally()
-    watch(of, (truth(of, tick, **fields) for tick, fields in enumerate(ticks)), observer)
+    watch(run, (truth(run, tick, **fields) for tick, fields in enumerate(ticks)), observer)
     return observer.end(last)["radio"]
 
 
@@ -59,36 +59,36 @@ def test_pdr_is_received_over_intended_and_null_if_nothing_was_intended():
 
 
 def test_latency_on_air_ends_at_hearing_and_to_the_agent_at_the_tick_that_hands_it_over():
-    [found] = tallied(static(), {"tally": tally({})}, {"finished": finished([40_000_000], [65_000_000])})
-    assert found["latency_air_s"] == {p: pytest.approx(0.025, rel=0.005) for p in ("p50", "p90", "p99")}
-    assert found["latency_agent_s"] == {p: pytest.approx(0.06, rel=0.005) for p in ("p50", "p90", "p99")}
+    [summary] = tallied(static(), {"tally": tally({})}, {"finished": finished([40_000_000], [65_000_000])})
+    assert summary["latency_air_s"] == {p: pytest.approx(0.025, rel=0.005) for p in ("p50", "p90", "p99")}
+    assert summary["latency_agent_s"] == {p: pytest.approx(0.06, rel=0.005) for p in ("p50", "p90", "p99")}
 
 
 def test_latency_is_null_where_no_packet_was_received():
     lost = finished([0], [50_000_000], fate=Fate.LOST)
-    [found] = tallied(static(), {"tally": tally({Fate.LOST: 1}), "finished": lost})
-    assert found["latency_air_s"] == {"p50": None, "p90": None, "p99": None}
+    [summary] = tallied(static(), {"tally": tally({Fate.LOST: 1}), "finished": lost})
+    assert summary["latency_air_s"] == {"p50": None, "p90": None, "p99": None}
 
 
 def test_without_a_radio_the_summary_has_no_part_of_it():
-    of, observer = static(radio=False), RadioTally()
-    observer.begin(of)
-    observer.see(truth(of))
+    run, observer = static(radio=False), RadioTally()
+    observer.begin(run)
+    observer.see(truth(run))
     assert observer.end(None) == {}
 
 
 def test_delivery_summary_is_plain_json():
-    found = tallied(static(), {"tally": tally({Fate.RECEIVED: 2}), "finished": finished([0, 0], [5, 7])})
-    assert json.loads(json.dumps(found, allow_nan=False)) == found
+    summary = tallied(static(), {"tally": tally({Fate.RECEIVED: 2}), "finished": finished([0, 0], [5, 7])})
+    assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 
 @given(st.lists(st.lists(st.integers(0, 9), min_size=len(Fate), max_size=len(Fate)), max_size=5))
 def test_fates_of_a_run_are_the_sums_over_its_ticks(ticks):
     table = np.array(ticks, np.int64).reshape(-1, len(Fate))
-    seen = [{"tally": tally(dict(zip(Fate, row, strict=True)))} for row in ticks]
-    [found] = tallied(static(), *seen, last=tally({}))
-    assert list(found["fates"].values()) == table.sum(axis=0).tolist()
-    assert sum(found["fates"].values()) == found["intended"]
+    tallies = [{"tally": tally(dict(zip(Fate, row, strict=True)))} for row in ticks]
+    [summary] = tallied(static(), *tallies, last=tally({}))
+    assert list(summary["fates"].values()) == table.sum(axis=0).tolist()
+    assert sum(summary["fates"].values()) == summary["intended"]
 
 
 def test_robot_counts_cover_packets_it_sent_and_those_meant_for_it():
@@ -113,10 +113,10 @@ def test_robot_counts_cover_packets_it_sent_and_those_meant_for_it():
 @settings(max_examples=25)
 @given(radio_runs())
 def test_robots_have_what_counters_have(run):
-    of, seen = run
-    counts, as_sender, as_receiver, got, packets = RobotCounts(of), Counter(), Counter(), Counter(), Counter()
-    tally = np.zeros((of.arenas, len(Fate)), np.int64)
-    for one in seen:
+    run, truths = run
+    counts, as_sender, as_receiver, got, packets = RobotCounts(run), Counter(), Counter(), Counter(), Counter()
+    tally = np.zeros((run.arenas, len(Fate)), np.int64)
+    for one in truths:
         counts.add(one.departed, one.finished)
         tally += one.tally.fates
         columns = ("arena", "sender", "receiver", "receivers", "fate", "size_bytes")
@@ -128,28 +128,28 @@ def test_robots_have_what_counters_have(run):
         for arena, sender, far in rows_of(one.departed, "arena", "sender", "out_of_range"):
             as_sender[arena, sender, Fate.OUT_OF_RANGE] += far
             packets[arena, sender] += 1
-    robots = [divmod(row, of.robots) for row in range(of.arenas * of.robots)]
+    robots = [divmod(row, run.robots) for row in range(run.arenas * run.robots)]
     assert counts.as_sender.tolist() == [[as_sender[*robot, fate] for fate in Fate] for robot in robots]
     assert counts.as_receiver.tolist() == [[as_receiver[*robot, fate] for fate in Fate] for robot in robots]
     assert counts.received_bytes.tolist() == [got[robot] for robot in robots]
     assert counts.packets.tolist() == [packets[robot] for robot in robots]
     assert (counts.in_flight >= 0).all()
-    np.testing.assert_array_equal(counts.as_sender.reshape(of.arenas, of.robots, -1).sum(axis=1), tally)
+    np.testing.assert_array_equal(counts.as_sender.reshape(run.arenas, run.robots, -1).sum(axis=1), tally)
 
 
 @pytest.mark.parametrize("waiting", [1, 20, 10**6])
 @settings(max_examples=10)
 @given(run=radio_runs())
 def test_links_have_what_a_counter_has_however_often_they_are_added_up(waiting, run):
-    of, seen = run
-    counts, expected = LinkCounts(of), Counter()
+    run, truths = run
+    counts, expected = LinkCounts(run), Counter()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(links_table, "MAX_PENDING_ROWS", waiting)
-        for one in seen:
+        for one in truths:
             counts.add(one.finished)
             expected.update(row for row in rows_of(one.finished, "arena", "sender", "receiver", "fate") if row[2] >= 0)
-        found = counts.columns()
-    *link, packets = (column.tolist() for column in found.values())
+        columns = counts.columns()
+    *link, packets = (column.tolist() for column in columns.values())
     assert dict(zip(zip(*link, strict=True), packets, strict=True)) == expected
     assert list(zip(*link, strict=True)) == sorted(expected)
 
@@ -163,15 +163,15 @@ def test_airtime_and_throughput_of_steady_senders_match_the_radio():
 
     A packet that goes on air late in a tick counts in the next: of 30 packets of a robot that moves at most one.
     """
-    of, size, lost, radio = static(20), 25, 0.3, Radio(range_m=50.0, loss=0.3, bit_rate_bps=20_000, overhead_bytes=5)
-    air, metrics, told = make_medium(radio, of.robots, of.seeds, [()]), Metrics(["airtime", "throughput"]), []
-    metrics.begin(of)
+    run, size, lost, radio = static(20), 25, 0.3, Radio(range_m=50.0, loss=0.3, bit_rate_bps=20_000, overhead_bytes=5)
+    air, metrics, values = make_medium(radio, run.robots, run.seeds, [()]), Metrics(["airtime", "throughput"]), []
+    metrics.begin(run)
     for tick in range(31):
         news = air.step(tick * TICK_MS * MS, np.zeros((20, 3)))
-        metrics.see(truth(of, tick, finished=news.finished, departed=news.departed))
-        told.append([metrics.latest[name][0] for name in ("airtime", "throughput")])
+        metrics.see(truth(run, tick, finished=news.finished, departed=news.departed))
+        values.append([metrics.latest[name][0] for name in ("airtime", "throughput")])
         air.send(tick * TICK_MS * MS, tick, packets(np.arange(20), size=np.full(20, size)))
-    share, bits = np.mean(told[1:], axis=0)
+    share, bits = np.mean(values[1:], axis=0)
     assert share == pytest.approx(8 * (size + 5) * 10 / 20_000, rel=1 / 30)
     assert bits == pytest.approx(20 * 19 * (1 - lost) * 8 * size * 10, rel=0.03)
 
@@ -179,19 +179,19 @@ def test_airtime_and_throughput_of_steady_senders_match_the_radio():
 @settings(max_examples=25)
 @given(radio_runs())
 def test_airtime_and_throughput_are_sums_over_packets(run):
-    of, seen = run
+    run, truths = run
     metrics = Metrics(["airtime", "throughput"])
-    metrics.begin(of)
+    metrics.begin(run)
     owed_ns = Counter()
-    for one in seen:
+    for one in truths:
         metrics.see(one)
         for arena, sender, fate, on, off in rows_of(
             one.departed, "arena", "sender", "fate", "on_air_at_ns", "off_air_at_ns"
         ):
             assert off >= on if fate == Fate.RECEIVED else off == on
             owed_ns[arena, sender] += off - on
-        share, bits = np.zeros(of.arenas), np.zeros(of.arenas)
-        alive = one.alive.reshape(of.arenas, of.robots)
+        share, bits = np.zeros(run.arenas), np.zeros(run.arenas)
+        alive = one.alive.reshape(run.arenas, run.robots)
         for arena, robot in list(owed_ns):
             counted_ns = min(owed_ns[arena, robot], TICK_MS * MS)
             owed_ns[arena, robot] -= counted_ns
@@ -199,4 +199,4 @@ def test_airtime_and_throughput_are_sums_over_packets(run):
         for arena, fate, size in rows_of(one.finished, "arena", "fate", "size_bytes"):
             bits[arena] += 8 * size if fate == Fate.RECEIVED else 0
         assert metrics.latest["airtime"] == pytest.approx(share)
-        assert metrics.latest["throughput"] == pytest.approx(bits * of.rate_hz)
+        assert metrics.latest["throughput"] == pytest.approx(bits * run.rate_hz)

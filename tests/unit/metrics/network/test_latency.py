@@ -30,15 +30,15 @@ PERCENTS = (0.0, 50.0, 90.0, 99.0, 100.0)
 KINDS = PacketDeliveryRatio, LinkPacketDeliveryRatio, LatencyOnAir, LatencyToAgent
 
 
-def told(of, seen, window_s):
+def window_values(run, truths, window_s):
     """The metrics of KINDS in each tick, (4, ticks, arenas)."""
-    return in_each_tick(of, seen, *(kind(window_s=window_s) for kind in KINDS)).transpose(1, 0, 2)
+    return in_each_tick(run, truths, *(kind(window_s=window_s) for kind in KINDS)).transpose(1, 0, 2)
 
 
 @given(st.lists(st.integers(-9, 9), max_size=30), st.integers(1, 8))
 def test_window_holds_the_last_ticks(numbers, size):
-    of = static(1, arenas=2)
-    window = Window(of, size / of.rate_hz, 1)
+    run = static(1, arenas=2)
+    window = Window(run, size / run.rate_hz, 1)
     for tick, number in enumerate(numbers):
         own = numbers[max(0, tick + 1 - size) : tick + 1]
         assert window.add([[number, 2 * number]]).tolist() == [[sum(own), 2 * sum(own)]]
@@ -53,12 +53,12 @@ def test_window_is_rounded_up_to_whole_ticks():
 @settings(max_examples=25)
 @given(radio_runs(), st.integers(1, 5), st.integers(1, 3))
 def test_ratios_and_latencies_are_sums_over_packets_of_the_window(run, size, every):
-    drawn, seen = run
-    of = replace(drawn, groups=(replace(drawn.groups[0], act_every_ticks=every),))
-    found = told(of, seen, window_s=size * 0.1)
-    for tick in range(len(seen)):
-        for arena in range(of.arenas):
-            window = seen[max(0, tick + 1 - size) : tick + 1]
+    drawn, truths = run
+    run = replace(drawn, groups=(replace(drawn.groups[0], act_every_ticks=every),))
+    values = window_values(run, truths, window_s=size * 0.1)
+    for tick in range(len(truths)):
+        for arena in range(run.arenas):
+            window = truths[max(0, tick + 1 - size) : tick + 1]
             received = sum(int(one.tally.fates[arena, Fate.RECEIVED]) for one in window)
             in_range = sum(int(one.tally.in_range[arena]) for one in window)
             ended = sum(int(one.tally.fates[arena].sum()) for one in window)
@@ -75,7 +75,7 @@ def test_ratios_and_latencies_are_sums_over_packets_of_the_window(run, size, eve
                 np.mean(air) if air else np.nan,
                 np.mean(agent) if agent else np.nan,
             ]
-            assert found[:, tick, arena].tolist() == pytest.approx(expected, nan_ok=True)
+            assert values[:, tick, arena].tolist() == pytest.approx(expected, nan_ok=True)
 
 
 LOSSES = 0.3
@@ -84,14 +84,14 @@ OPEN = Radio(range_m=50.0, loss=LOSSES, latency_s=0.15, jitter_s=0.1)
 
 def test_ratio_and_latency_under_independent_losses_match_the_radio():
     """Of 15000 links the ratio deviates by 0.004, the mean of the jitter by 0.0003 s: five times that is let pass."""
-    of = static(20, arenas=4)
-    air = make_medium(OPEN, of.robots, of.seeds, [()] * of.arenas)
-    seen = []
+    run = static(20, arenas=4)
+    air = make_medium(OPEN, run.robots, run.seeds, [()] * run.arenas)
+    truths = []
     for tick in range(16):
         news = air.step(tick * 100 * MS, np.zeros((80, 3)))
-        seen.append(truth(of, tick, tally=news.tally, finished=news.finished))
+        truths.append(truth(run, tick, tally=news.tally, finished=news.finished))
         air.send(tick * 100 * MS, tick, packets(np.arange(80), np.full(80, BROADCAST), np.full(80, 10)))
-    pdr, link_pdr, air_s, agent_s = told(of, seen, window_s=1.0)[:, -1]
+    pdr, link_pdr, air_s, agent_s = window_values(run, truths, window_s=1.0)[:, -1]
     np.testing.assert_array_equal(pdr, link_pdr)  # everybody is in range
     assert pdr.mean() == pytest.approx(1 - LOSSES, abs=0.02)
     assert air_s.mean() == pytest.approx(0.15 + 0.5 * 0.1, abs=0.0015)
@@ -102,9 +102,9 @@ def test_ratio_and_latency_under_independent_losses_match_the_radio():
 NAME = "age_of_information"
 
 
-def ages(of, seen):
+def ages(run, truths):
     """The metric in each tick, (ticks, arenas)."""
-    return in_each_tick(of, seen, NAME)[:, 0]
+    return in_each_tick(run, truths, NAME)[:, 0]
 
 
 def links_received(sender, receiver, sent_at_ms, fate=Fate.RECEIVED, arena=0):
@@ -118,72 +118,72 @@ def received_at(sent_at_ms, final_at_ms):
 
 
 def test_peak_age_is_the_age_just_before_a_newer_packet_came():
-    of = static(2)
-    told = [
+    run = static(2)
+    links = [
         received_at([30], [60]),  # the first: no peak
         received_at([110, 150], [190, 170]),  # 170 - 30; the other comes too late
         replace(received_at([210], [230]), fate=np.array([Fate.LOST])),
         received_at([310], [330]),  # 330 - 150
     ]
-    seen = [truth(of, tick, finished=one) for tick, one in enumerate(told)]
-    found = in_each_tick(of, seen, "peak_age_of_information")[:, 0]
-    assert found.ravel().tolist() == [pytest.approx(value, nan_ok=True) for value in (np.nan, 0.14, 0.14, 0.16)]
+    truths = [truth(run, tick, finished=one) for tick, one in enumerate(links)]
+    values = in_each_tick(run, truths, "peak_age_of_information")[:, 0]
+    assert values.ravel().tolist() == [pytest.approx(value, nan_ok=True) for value in (np.nan, 0.14, 0.14, 0.16)]
 
 
 def test_receivers_are_thinned_in_the_age_of_large_swarms(monkeypatch):
     monkeypatch.setattr(age_of_information, "MAX_PAIRS", 20)  # 6 x 6 / 20: every second
-    of = static(6)
-    told = links_received([0, 0, 0], [1, 2, 4], [90, 80, 60])
-    assert ages(of, [truth(of, 1, finished=told)]).ravel().tolist() == [pytest.approx(0.03)]
+    run = static(6)
+    links = links_received([0, 0, 0], [1, 2, 4], [90, 80, 60])
+    assert ages(run, [truth(run, 1, finished=links)]).ravel().tolist() == [pytest.approx(0.03)]
 
 
 def test_age_sums_beyond_64_bits_have_the_right_mean():
-    of, long_ns = static(4), 10**18
+    run, long_ns = static(4), 10**18
     pairs = [(a, b) for a in range(4) for b in range(4) if a != b]
-    told = [links_received(*np.transpose(some), [long_ns // MS] * 6) for some in (pairs[:6], pairs[6:])]
-    seen = [truth(of, tick, time_ns=(tick + 2) * long_ns, finished=one) for tick, one in enumerate(told)]
-    assert ages(of, seen).ravel().tolist() == [pytest.approx(1e9), pytest.approx(2e9)]
+    links = [links_received(*np.transpose(some), [long_ns // MS] * 6) for some in (pairs[:6], pairs[6:])]
+    truths = [truth(run, tick, time_ns=(tick + 2) * long_ns, finished=one) for tick, one in enumerate(links)]
+    assert ages(run, truths).ravel().tolist() == [pytest.approx(1e9), pytest.approx(2e9)]
     dead = np.array([False, True, True, True])
-    seen.append(truth(of, 2, time_ns=4 * long_ns, finished=links_received([], [], []), alive=dead))
-    assert ages(of, seen)[2, 0] == pytest.approx(3e9)
+    truths.append(truth(run, 2, time_ns=4 * long_ns, finished=links_received([], [], []), alive=dead))
+    assert ages(run, truths)[2, 0] == pytest.approx(3e9)
 
 
 @settings(max_examples=25)
 @given(radio_runs())
 def test_age_is_that_of_a_dictionary_of_what_each_has_received(run):
-    of, seen = run
+    run, truths = run
     newest, expected = {}, []
-    for one in seen:
+    for one in truths:
         for arena, sender, receiver, sent, fate in rows_of(
             one.finished, "arena", "sender", "receiver", "sent_at_ns", "fate"
         ):
             if fate == Fate.RECEIVED:
                 pair = arena, sender, receiver
                 newest[pair] = max(newest.get(pair, sent), sent)
-        alive = one.alive.reshape(of.arenas, of.robots)
+        alive = one.alive.reshape(run.arenas, run.robots)
         own = [
             [
                 one.time_ns - sent
                 for (arena, a, b), sent in newest.items()
                 if arena == each and alive[each][[a, b]].all()
             ]
-            for each in range(of.arenas)
+            for each in range(run.arenas)
         ]
         expected.append([sum(times) / len(times) / NS_PER_S if times else np.nan for times in own])
-    np.testing.assert_allclose(ages(of, seen), expected, rtol=1e-12)
+    np.testing.assert_allclose(ages(run, truths), expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.3, 0.6])
 def test_age_under_independent_losses_is_that_of_renewal_theory(lost):
     """Mean d + T (1 + p) / (2 (1 - p)): of 40,000 periods it deviates by a hundredth at most."""
     rng, arenas, periods, delay_ms, period_ms = np.random.default_rng(3), 100, 400, 50, 300
-    of, seen = static(2, arenas=arenas), []
+    run, truths = static(2, arenas=arenas), []
     for tick in range(1, 3 * periods):
         arrived = np.flatnonzero(rng.random(arenas) >= lost) if tick % 3 == 1 else np.arange(0)
         none = np.zeros(len(arrived), np.int64)
-        told = links_received(none, none + 1, none + (tick - 1) * 100, arena=arrived)
-        seen.append(truth(of, tick, finished=told))
-    mean_s = np.mean(ages(of, seen)[100:])
+        links = links_received(none, none + 1, none + (tick - 1) * 100, arena=arrived)
+        truths.append(truth(run, tick, finished=links))
+    mean_s = np.mean(ages(run, truths)[100:])
     # Known from the tick after: seen at 0.1, 0.2, … s of age, whose mean is that of 0.05 s of delay.
     expected_s = (delay_ms + period_ms * (1 + lost) / (2 * (1 - lost))) / 1000
     assert mean_s == pytest.approx(expected_s, rel=0.02)

@@ -120,46 +120,46 @@ def made(delays: Delays, constant_s: float = 0.0) -> np.ndarray:
 
 @pytest.mark.parametrize("distribution", ["normal", "lognormal", "pareto"])
 def test_delay_distributions_are_identified_and_their_parameters_recovered(distribution):
-    of = fit_latency(made(Delays(distribution, 0.02, 0.006)))
-    assert isinstance(of, LatencyFit)
-    assert of.delays is not None
-    assert of.delays.distribution == distribution
-    assert of.delays.ks_distance < 0.02 < of.ks_distance
+    fit = fit_latency(made(Delays(distribution, 0.02, 0.006)))
+    assert isinstance(fit, LatencyFit)
+    assert fit.delays is not None
+    assert fit.delays.distribution == distribution
+    assert fit.delays.ks_distance < 0.02 < fit.ks_distance
     # A constant and what varies are told apart less well than their sum.
-    assert of.delays.latency_s.value + of.delays.mean_s.value == pytest.approx(0.02, rel=0.03)
-    assert of.delays.deviation_s.value == pytest.approx(0.006, rel=0.15)
-    assert 0.0 < of.delays.mean_s.standard_error < 0.004
+    assert fit.delays.latency_s.value + fit.delays.mean_s.value == pytest.approx(0.02, rel=0.03)
+    assert fit.delays.deviation_s.value == pytest.approx(0.006, rel=0.15)
+    assert 0.0 < fit.delays.mean_s.standard_error < 0.004
 
 
 def test_constant_below_a_skewed_delay_is_recovered():
-    of = fit_delays(made(Delays("lognormal", 0.01, 0.01), constant_s=0.05))
-    assert of is not None
-    assert of.distribution == "lognormal"
-    assert of.latency_s.value == pytest.approx(0.05, abs=0.001)
-    assert of.mean_s.value == pytest.approx(0.01, rel=0.05)
+    fit = fit_delays(made(Delays("lognormal", 0.01, 0.01), constant_s=0.05))
+    assert fit is not None
+    assert fit.distribution == "lognormal"
+    assert fit.latency_s.value == pytest.approx(0.05, abs=0.001)
+    assert fit.mean_s.value == pytest.approx(0.01, rel=0.05)
 
 
 def test_made_again_of_its_fit_a_gamma_delay_has_the_same_quantiles():
     """None of the distributions is a gamma one: the nearest of them stands for it."""
     latency_s = np.random.default_rng(6).gamma(2.0, 0.005, PACKETS) + 0.002
-    of = fit_latency(latency_s)
-    assert isinstance(of, LatencyFit)
-    found = of.delays
-    assert found is not None
-    again_s = made(Delays(found.distribution, found.mean_s.value, found.deviation_s.value), found.latency_s.value)
+    fit = fit_latency(latency_s)
+    assert isinstance(fit, LatencyFit)
+    delays = fit.delays
+    assert delays is not None
+    again_s = made(Delays(delays.distribution, delays.mean_s.value, delays.deviation_s.value), delays.latency_s.value)
     for percent in (10.0, 50.0, 90.0):
         assert np.percentile(again_s, percent) == pytest.approx(np.percentile(latency_s, percent), rel=0.05)
 
 
 def test_uniform_delays_stay_uniform():
-    of = fit_latency(made(Delays("uniform", 0.02, 0.005)))
-    assert isinstance(of, LatencyFit)
-    assert of.delays is None
+    fit = fit_latency(made(Delays("uniform", 0.02, 0.005)))
+    assert isinstance(fit, LatencyFit)
+    assert fit.delays is None
 
 
 def test_few_very_late_packets_make_no_other_distribution():
     latency_s = made(Delays("uniform", 0.02, 0.005))
     latency_s[::40] += 2.0
-    of = fit_latency(latency_s)
-    assert isinstance(of, LatencyFit)
-    assert of.delays is None
+    fit = fit_latency(latency_s)
+    assert isinstance(fit, LatencyFit)
+    assert fit.delays is None

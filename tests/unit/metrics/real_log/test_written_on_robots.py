@@ -51,11 +51,11 @@ def by_robots(folder):
             command = Command(*truth.command[robot, :2].tolist())
             pose = Pose(x_m, y_m, heading_rad)
             log.tick(TickRow(truth.tick, UTC_NS + truth.time_ns, False, pose, True, command, 'say "a, b"', 1.5, None))
-        told = read_robot_log(made_up / name)
-        begin_s = told.steps.time_s[0]
-        for at_s, sequence, size in zip(told.sent.time_s, told.sent.sequence, told.sent.size_bytes, strict=True):
+        source = read_robot_log(made_up / name)
+        begin_s = source.steps.time_s[0]
+        for at_s, sequence, size in zip(source.sent.time_s, source.sent.sequence, source.sent.size_bytes, strict=True):
             log.sent(SentPacket(UTC_NS + to_ns(at_s - begin_s), int(sequence), BROADCAST, int(size), 7, "sent"))
-        received = told.received
+        received = source.received
         for row in range(len(received.sequence)):
             at_ns = UTC_NS + to_ns(received.time_s[row] - begin_s)
             sender, latency_ns = static.robot_names.index(received.sender[row]), to_ns(received.latency_s[row])

@@ -119,8 +119,8 @@ def test_links_to_files_of_the_user_are_replaced_by_a_report(foreign):
     folder, mine = foreign
     (folder / "figures").mkdir()
     places = [folder / ".aside-report.html", folder / "figures" / ".aside-first.svg", folder / "figures" / "first.svg"]
-    for place in places:
-        place.symlink_to(mine / "first.svg")
+    for link in places:
+        link.symlink_to(mine / "first.svg")
     content = Report("Foreign", (Section("Part", (Figure("first", drawn(), "A figure"),)),))
     written = write_report(content, folder / "report.html")
     assert [file.name for file in mine.iterdir()] == ["first.svg"]

@@ -36,38 +36,38 @@ def recorded(request, tmp_path, monkeypatch):
     if request.param == "killed":
         monkeypatch.setattr(writer, "join_parts", lambda *_: None)
     monkeypatch.setattr(ticks, "MAX_TICKS", 4)
-    of, kill = static(3, arenas=2), EventRecord(0, 0.0, "kill", False, np.array([False, True, False] * 2))
-    seen = list(wandering(of, TICKS, events=(kill,), finished=links([0, 1], [2, 0], [5, 6], 0, arena=[0, 1])))
-    record(tmp_path, of, seen, packets=1.0)
+    run, kill = static(3, arenas=2), EventRecord(0, 0.0, "kill", False, np.array([False, True, False] * 2))
+    truths = list(wandering(run, TICKS, events=(kill,), finished=links([0, 1], [2, 0], [5, 6], 0, arena=[0, 1])))
+    record(tmp_path, run, truths, packets=1.0)
     assert (tmp_path / "ticks").is_dir() == (request.param == "killed")
-    return RunFolder(tmp_path), of, seen
+    return RunFolder(tmp_path), run, truths
 
 
 def test_tables_are_read_of_all_arenas_or_of_one(recorded):
-    folder, of, _ = recorded
+    folder, run, _ = recorded
     assert folder.ticks()["tick"].to_list() == [tick for tick in range(TICKS) for _ in range(2)]
     for arena in range(2):
-        assert folder.ticks(arena)["seed"].to_list() == [of.seeds[arena]] * TICKS
+        assert folder.ticks(arena)["seed"].to_list() == [run.seeds[arena]] * TICKS
         assert folder.packets(arena)["sender"].to_list() == [arena] * TICKS
         assert folder.events(arena)["robots"].to_list() == [["flock-1"]] * TICKS
     assert (len(folder.packets()), len(folder.events())) == (2 * TICKS, 2 * TICKS)
-    assert folder.static == of
+    assert folder.static == run
 
 
 def test_robots_have_a_row_each_per_tick(recorded):
-    folder, of, seen = recorded
+    folder, run, truths = recorded
     table = folder.robots(1)
     assert table.columns[:6] == ["tick", "time_s", "robot", "group", "x_m", "y_m"]
-    assert len(table) == TICKS * of.robots
-    for row, name in enumerate(of.robot_names):
+    assert len(table) == TICKS * run.robots
+    for row, name in enumerate(run.robot_names):
         own = table.filter(pl.col("robot") == name)
-        at = of.robots + row
+        at = run.robots + row
         assert own["tick"].to_list() == list(range(TICKS))
         assert own["group"].unique().to_list() == ["flock"]
-        assert np.array_equal(own["x_m"], np.array([one.pose[at, 0] for one in seen], np.float32))
-        assert np.array_equal(own["command_turn_radps"], np.array([one.command[at, 1] for one in seen], np.float32))
-        assert own["alive"].to_list() == [one.alive[at] for one in seen]
-        assert own["state"].to_list() == [one.states[one.state[at]] for one in seen]
+        assert np.array_equal(own["x_m"], np.array([one.pose[at, 0] for one in truths], np.float32))
+        assert np.array_equal(own["command_turn_radps"], np.array([one.command[at, 1] for one in truths], np.float32))
+        assert own["alive"].to_list() == [one.alive[at] for one in truths]
+        assert own["state"].to_list() == [one.states[one.state[at]] for one in truths]
 
 
 @pytest.mark.parametrize("since", [0, 2, 6, TICKS - 1, TICKS])
@@ -77,17 +77,17 @@ def test_numbers_that_robots_told_are_recorded_from_the_first_on(tmp_path, monke
     if killed:
         monkeypatch.setattr(writer, "join_parts", lambda *_: None)
     monkeypatch.setattr(ticks, "MAX_TICKS", 4)
-    of, rng = static(3, arenas=2), np.random.default_rng(3)
+    run, rng = static(3, arenas=2), np.random.default_rng(3)
     values = rng.normal(size=(TICKS, 6))
     values[:since] = np.nan
     values[:, 4] = np.nan
-    seen = [
-        replace(one, value=values[tick] if tick >= since else None) for tick, one in enumerate(wandering(of, TICKS))
+    truths = [
+        replace(one, value=values[tick] if tick >= since else None) for tick, one in enumerate(wandering(run, TICKS))
     ]
-    record(tmp_path, of, seen)
+    record(tmp_path, run, truths)
     folder = RunFolder(tmp_path)
     assert folder.metrics(0).columns == [name for name in folder.metrics(1).columns if name != "value"]
-    assert TABLES["ticks"].fault(folder.ticks().lazy(), of) is None
+    assert TABLES["ticks"].fault(folder.ticks().lazy(), run) is None
     assert {finding.state for finding in verify(tmp_path) if finding.part == "ticks"} <= {
         TableState.INTACT,
         TableState.PARTIAL,
@@ -105,14 +105,14 @@ def test_numbers_that_robots_told_are_recorded_from_the_first_on(tmp_path, monke
 
 def test_speeds_to_the_left_are_recorded_of_robots_that_can_move_so(tmp_path):
     drive = {"kind": "holonomic", "max_speed_mps": 1, "max_angular_radps": 1, "max_force_n": 1, "max_torque_nm": 1}
-    of = static(3, body=body_from({"like": "epuck", "name": "disc", "drive": drive}, "disc.toml"))
-    seen = list(wandering(of, 5))
-    record(tmp_path, of, seen)
+    run = static(3, body=body_from({"like": "epuck", "name": "disc", "drive": drive}, "disc.toml"))
+    truths = list(wandering(run, 5))
+    record(tmp_path, run, truths)
     table = RunFolder(tmp_path).robots()
-    left_mps = np.array([one.command[:, 2] for one in seen], np.float32)
+    left_mps = np.array([one.command[:, 2] for one in truths], np.float32)
     assert np.array_equal(table["command_left_mps"], left_mps.ravel())
     assert "command_left_mps" not in RunFolder(tmp_path).metrics().columns
-    assert TABLES["ticks"].fault(pl.scan_parquet(RunFolder(tmp_path).files("ticks")), of) is None
+    assert TABLES["ticks"].fault(pl.scan_parquet(RunFolder(tmp_path).files("ticks")), run) is None
 
 
 def test_metrics_have_a_row_per_tick_and_no_lists(recorded):
@@ -171,9 +171,9 @@ def test_missing_folder_table_and_static_part_are_named(tmp_path):
 
 
 def test_events_and_packets_of_a_killed_run_without_any_are_empty(tmp_path):
-    of = static(2)
+    run = static(2)
     (tmp_path / "ended").mkdir()
-    record(tmp_path / "ended", of, wandering(of, 2), packets=1.0)
+    record(tmp_path / "ended", run, wandering(run, 2), packets=1.0)
     for name in ("packets", "events"):
         (tmp_path / name).mkdir()
         left, ended = getattr(RunFolder(tmp_path), name)(), getattr(RunFolder(tmp_path / "ended"), name)()
@@ -245,10 +245,10 @@ def statics(draw):
 
 @given(statics())
 @settings(max_examples=40, deadline=None)
-def test_static_part_is_read_back_equal(tmp_path_factory, of):
+def test_static_part_is_read_back_equal(tmp_path_factory, run):
     path = tmp_path_factory.mktemp("run") / "static.json"
-    write_static(of, path)
-    assert read_static(path) == of
+    write_static(run, path)
+    assert read_static(path) == run
     assert [file.name for file in path.parent.iterdir()] == ["static.json"]
 
 
@@ -320,9 +320,9 @@ def test_axis_of_a_metric_follows_its_recorded_facts():
 
 def tables_of_a_run(folder, run_json):
     """The tables of a run of 3 robots in 11 ticks, all of them intact."""
-    of = static(3)
+    run = static(3)
     finished = links([0, 1], [2, 0], [5, 6], 0)
-    record(folder, of, list(wandering(of, TICKS, finished=finished)), packets=1.0)
+    record(folder, run, list(wandering(run, TICKS, finished=finished)), packets=1.0)
     (folder / "run.json").write_text(json.dumps({"format": 1, **run_json}))
     return RunFolder(folder)
 
@@ -342,9 +342,9 @@ def test_rows_beyond_those_of_the_run_are_refused_unread(tmp_path, name, most):
     with pytest.raises(BadInput) as refused:
         folder.table(name)
     assert refused.value.where == str(tmp_path / f"{name}.parquet")
-    (found,) = (finding for finding in verify(tmp_path) if finding.part == name)
-    assert found.state is TableState.DAMAGED
-    assert f"{most + 1} rows" in found.text
+    (finding,) = (row for row in verify(tmp_path) if row.part == name)
+    assert finding.state is TableState.DAMAGED
+    assert f"{most + 1} rows" in finding.text
 
 
 @pytest.mark.parametrize("claimed", [{"ticks": 10**15}, {}])

@@ -32,9 +32,9 @@ OF = static(5, arenas=2)
 @pytest.fixture
 def folder(tmp_path):
     """A run folder as far as the radio goes, with its summary."""
-    seen = list(ticks(DISK, OF, 7, count=20))
-    recorded, tally = record(tmp_path, OF, seen, links=True), RadioTally()
-    watch(OF, seen, tally)
+    truths = list(ticks(DISK, OF, 7, count=20))
+    recorded, tally = record(tmp_path, OF, truths, links=True), RadioTally()
+    watch(OF, truths, tally)
     summary = made_up_summary(20, arenas=2, record=recorded, **tally.end(None))
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     return RunFolder(tmp_path)
@@ -94,8 +94,8 @@ def test_radio_totals_that_are_damaged_are_found_with_their_fault(folder, table,
     file = folder.path / f"{table}.parquet"
     pl.read_parquet(file).with_columns(change).write_parquet(file)
     assert states(folder) == {**dict.fromkeys(TOTALS, TableState.INTACT), table: state}
-    (found,) = (finding for finding in verify(folder.path) if finding.part == table)
-    assert re.search(text, found.text)
+    (finding,) = (row for row in verify(folder.path) if row.part == table)
+    assert re.search(text, finding.text)
 
 
 def test_without_static_json_tables_are_checked_as_far_as_they_go(folder):
@@ -117,22 +117,22 @@ def test_distance_ratio_is_received_over_intended_in_adjacent_bins(folder):
 
 def test_distance_ratio_is_null_where_distances_were_forgotten(tmp_path, monkeypatch):
     monkeypatch.setattr(distances, "POSES_S", 0.1)
-    of = static(2)
+    run = static(2)
     nothing = links([], [], 0, 0)
-    seen = [truth(of, tick, departed=departed([0] if tick == 1 else []), finished=nothing) for tick in range(4)]
-    seen.append(truth(of, 4, departed=departed([]), finished=links([0], [1], 0, 0)))
-    told = record(tmp_path, of, seen)
-    assert told["radio_distances"] == {"rows": 1, "dropped": 0, "every": 1, "unknown": 1}
+    truths = [truth(run, tick, departed=departed([0] if tick == 1 else []), finished=nothing) for tick in range(4)]
+    truths.append(truth(run, 4, departed=departed([]), finished=links([0], [1], 0, 0)))
+    recorded = record(tmp_path, run, truths)
+    assert recorded["radio_distances"] == {"rows": 1, "dropped": 0, "every": 1, "unknown": 1}
     assert RunFolder(tmp_path).radio_distances().rows() == [(0, 0.0, 0.1, 1, 0, None)]
 
 
 def test_links_are_off_unless_asked_for_and_without_a_radio_there_is_no_table(tmp_path):
-    of = static(2)
-    quiet = truth(of, departed=departed([]), finished=links([], [], 0, 0))
+    run = static(2)
+    quiet = truth(run, departed=departed([]), finished=links([], [], 0, 0))
     (tmp_path / "radio").mkdir()
     (tmp_path / "none").mkdir()
-    assert record(tmp_path / "radio", of, [quiet]).keys() == {"ticks", "events", "radio_robots", "radio_distances"}
-    assert record(tmp_path / "none", of, [truth(of)], links=True).keys() == {"ticks", "events"}
+    assert record(tmp_path / "radio", run, [quiet]).keys() == {"ticks", "events", "radio_robots", "radio_distances"}
+    assert record(tmp_path / "none", run, [truth(run)], links=True).keys() == {"ticks", "events"}
     for table, missing in (("radio_links", "radio"), ("radio_robots", "none")):
         with pytest.raises(BadInput, check=lambda error, table=table: error.key == table):
             getattr(RunFolder(tmp_path / missing), table)()
@@ -141,9 +141,9 @@ def test_links_are_off_unless_asked_for_and_without_a_radio_there_is_no_table(tm
 
 @pytest.mark.parametrize("kind", [RobotCounts, DistanceCounts])
 def test_disk_that_refuses_a_total_fails_the_record(tmp_path, kind):
-    of, recorder = static(2), TotalsRecorder(tmp_path / "gone", "radio_robots", kind)
-    recorder.begin(of)
-    recorder.see(truth(of, departed=departed([0]), finished=links([], [], 0, 0)))
+    run, recorder = static(2), TotalsRecorder(tmp_path / "gone", "radio_robots", kind)
+    recorder.begin(run)
+    recorder.see(truth(run, departed=departed([0]), finished=links([], [], 0, 0)))
     with pytest.raises(RecordFailed, match="radio_"):
         recorder.end(None)
 
@@ -157,15 +157,15 @@ def line(*x_m):
     return pose
 
 
-def seen_by(of, *ticks):
-    counts = DistanceCounts(of)
+def seen_by(run, *ticks):
+    counts = DistanceCounts(run)
     for tick, fields in enumerate(ticks):
-        counts.see(truth(of, tick, **fields))
+        counts.see(truth(run, tick, **fields))
     return counts
 
 
 def bins(table, arena=0):
-    return {place: int(table[arena, place]) for place in np.flatnonzero(table[arena])}
+    return {index: int(table[arena, index]) for index in np.flatnonzero(table[arena])}
 
 
 @pytest.mark.parametrize(("range_m", "width_m"), [(2.0, 0.1), (3.9, 0.1), (4.0, 0.2), (100.0, 5.0), (0.05, 0.002)])
@@ -182,10 +182,10 @@ def test_however_short_the_range_the_bins_reach_across_the_arena_and_are_few(ran
 
 
 def test_distance_counts_are_by_the_distance_in_space():
-    of = replace(static(2), arena_size_m=(40.0, 40.0), range_m=30.0)
+    run = replace(static(2), arena_size_m=(40.0, 40.0), range_m=30.0)
     pose, height_m = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0]]), np.array([0.0, 12.0])
     counts = seen_by(
-        of, {"pose": pose, "height_m": height_m, "departed": departed([0]), "finished": links([0], [1], 0, 0)}
+        run, {"pose": pose, "height_m": height_m, "departed": departed([0]), "finished": links([0], [1], 0, 0)}
     )
     assert np.flatnonzero(counts.intended[0]).tolist() == [int(13.0 / counts.width_m)]
     assert np.array_equal(counts.intended, counts.received)
@@ -193,8 +193,8 @@ def test_distance_counts_are_by_the_distance_in_space():
 
 def test_distance_counts_leave_out_packets_that_never_went_on_air():
     refused = departed([0], fate=Fate.QUEUE_FULL)
-    told = {"departed": refused, "finished": links([0], [-1], 0, 0, fate=Fate.QUEUE_FULL, receivers=3)}
-    assert not seen_by(static(4), told).intended.any()
+    fields = {"departed": refused, "finished": links([0], [-1], 0, 0, fate=Fate.QUEUE_FULL, receivers=3)}
+    assert not seen_by(static(4), fields).intended.any()
 
 
 def test_distance_counts_of_receptions_too_late_are_unknown(monkeypatch):
@@ -208,37 +208,37 @@ def test_distance_counts_of_receptions_too_late_are_unknown(monkeypatch):
 @settings(max_examples=15)
 @given(run=radio_runs())
 def test_distance_counts_are_those_of_a_loop_over_packets_and_robots(pairs_per_tick, run):
-    of, seen = run
+    run, truths = run
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(distances, "PAIRS_PER_TICK", pairs_per_tick)
-        counts = DistanceCounts(of)
+        counts = DistanceCounts(run)
     spread = int(distances.SEQUENCE_MULTIPLIER), int(distances.SENDER_MULTIPLIER)
     intended, received = Counter(), Counter()
 
-    def place(arena, a, b, on_air_at_ns):
-        tick = max(one.tick for one in seen if one.time_ns <= on_air_at_ns)
-        pose = seen[tick].pose.reshape(of.arenas, of.robots, 3)[arena]
+    def distance_bin(arena, a, b, on_air_at_ns):
+        tick = max(one.tick for one in truths if one.time_ns <= on_air_at_ns)
+        pose = truths[tick].pose.reshape(run.arenas, run.robots, 3)[arena]
         return arena, int(math.dist(pose[a, :2], pose[b, :2]) / counts.width_m)
 
-    def taken(sender, sequence):
+    def is_counted(sender, sequence):
         return (sequence * spread[0] + sender * spread[1]) % 2**64 * counts.every < 2**64
 
-    for one in seen:
+    for one in truths:
         counts.see(one)
         for arena, sender, to, sequence, fate, on_air in rows_of(
             one.departed, "arena", "sender", "to", "sequence", "fate", "on_air_at_ns"
         ):
-            tick = max(one.tick for one in seen if one.time_ns <= on_air)
-            alive = seen[tick].alive.reshape(of.arenas, of.robots)[arena]
-            for robot in range(of.robots):
+            tick = max(one.tick for one in truths if one.time_ns <= on_air)
+            alive = truths[tick].alive.reshape(run.arenas, run.robots)[arena]
+            for robot in range(run.robots):
                 meant = alive[robot] if to == BROADCAST else robot == to
-                if meant and robot != sender and fate == Fate.RECEIVED and taken(sender, sequence):
-                    intended[place(arena, sender, robot, on_air)] += 1
+                if meant and robot != sender and fate == Fate.RECEIVED and is_counted(sender, sequence):
+                    intended[distance_bin(arena, sender, robot, on_air)] += 1
         for arena, sender, receiver, sequence, fate, on_air in rows_of(
             one.finished, "arena", "sender", "receiver", "sequence", "fate", "on_air_at_ns"
         ):
-            if fate == Fate.RECEIVED and taken(sender, sequence):
-                received[place(arena, sender, receiver, on_air)] += 1
+            if fate == Fate.RECEIVED and is_counted(sender, sequence):
+                received[distance_bin(arena, sender, receiver, on_air)] += 1
     last = counts.intended.shape[1] - 1  # beyond the arena's corners, where these robots may walk
     for table, expected in ((counts.intended, intended), (counts.received, received)):
         within = Counter()
@@ -249,14 +249,14 @@ def test_distance_counts_are_those_of_a_loop_over_packets_and_robots(pairs_per_t
 
 
 def test_distance_counts_of_large_swarms_take_an_even_share_of_packets():
-    of = static(1000)
-    counts = DistanceCounts(of)
+    run = static(1000)
+    counts = DistanceCounts(run)
     assert counts.every == 256
     sender, sequence = (one.ravel() for one in np.meshgrid(np.arange(1000), np.arange(600)))
-    taken = counts._is_counted(sender, sequence)
-    assert taken.mean() == pytest.approx(1 / 256, rel=0.02)
+    counted = counts._is_counted(sender, sequence)
+    assert counted.mean() == pytest.approx(1 / 256, rel=0.02)
     for period in (2, 3, 4, 16):
-        turns = np.bincount(sequence[taken] % period)
+        turns = np.bincount(sequence[counted] % period)
         assert turns.min() > 0.9 * turns.max()
-    in_tick = np.bincount(sequence[taken], minlength=600)
+    in_tick = np.bincount(sequence[counted], minlength=600)
     assert (in_tick.min() >= 1, in_tick.max() <= 9) == (True, True)

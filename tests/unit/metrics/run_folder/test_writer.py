@@ -263,11 +263,11 @@ def file(tmp_path_factory):
 @given(data=damaged(parquet(FRAME)))
 def test_damaged_parquet_is_read_or_refused_in_one_line_with_its_name(file, data):
     file.write_bytes(data)
-    said = refusal(file)
-    if said is not None:
-        assert said.startswith(f"{file}: ")
-        assert said.endswith("take it away")
-        assert "\n" not in said
+    error = refusal(file)
+    if error is not None:
+        assert error.startswith(f"{file}: ")
+        assert error.endswith("take it away")
+        assert "\n" not in error
 
 
 def test_polars_panic_is_refused_with_the_file(file, monkeypatch):
@@ -284,14 +284,14 @@ def test_missing_parquet_is_refused_with_its_name(tmp_path):
         read_parquet(tmp_path / "none.parquet")
 
 
-@given(place=st.integers(0, 2), how=st.sampled_from([parquet(FRAME)[:-1], parquet(FRAME.cast({"order": pl.String}))]))
-def test_damaged_file_among_several_is_named_or_that_of_other_types(file, place, how):
+@given(index=st.integers(0, 2), how=st.sampled_from([parquet(FRAME)[:-1], parquet(FRAME.cast({"order": pl.String}))]))
+def test_damaged_file_among_several_is_named_or_that_of_other_types(file, index, how):
     files = [file.with_name(f"{number}.parquet") for number in range(3)]
     for each in files:
         each.write_bytes(parquet(FRAME))
     refuse_corrupt(files)
-    files[place].write_bytes(how)
-    with pytest.raises(BadInput) as told:
+    files[index].write_bytes(how)
+    with pytest.raises(BadInput) as error:
         refuse_corrupt(files)
     # Where the first is of other types than the rest, it is the second that differs from what came before.
-    assert told.value.where == str(files[place] if place or how.endswith(b"PAR") else files[1])
+    assert error.value.where == str(files[index] if index or how.endswith(b"PAR") else files[1])

@@ -27,10 +27,10 @@ def censored(value, limit):
 def test_seeds_that_both_have_are_compared_one_by_one():
     first = numbers([1.0, 20.0, 3.0, 99.0], seed=[1, 2, 3, 8])
     second = numbers([3.5, 2.5, 20.5, -7.0], seed=[3, 1, 2, 9])
-    found = difference(first, second)
-    assert (found.pairs, found.test) == (3, "Wilcoxon signed-rank")
-    assert (found.median, found.mean) == (0.5, pytest.approx(2.5 / 3.0))
-    assert found.p == 0.25
+    result = difference(first, second)
+    assert (result.pairs, result.test) == (3, "Wilcoxon signed-rank")
+    assert (result.median, result.mean) == (0.5, pytest.approx(2.5 / 3.0))
+    assert result.p == 0.25
 
 
 def test_paired_difference_cancels_what_seeds_share():
@@ -60,54 +60,56 @@ def test_numbers_of_few_values_are_discrete(one, other, discrete):
 @settings(max_examples=4)  # each resamples two samples, twice
 @given(number_samples, number_samples)
 def test_turning_the_two_turns_the_sign(one, other):
-    there, back = difference(one, other), difference(other, one)
-    assert there.median == -back.median
-    assert there.mean == pytest.approx(-back.mean, abs=1e-12)
-    assert there.delta == -back.delta
-    assert there.p == pytest.approx(back.p, nan_ok=True)
+    forth, back = difference(one, other), difference(other, one)
+    assert forth.median == -back.median
+    assert forth.mean == pytest.approx(-back.mean, abs=1e-12)
+    assert forth.delta == -back.delta
+    assert forth.p == pytest.approx(back.p, nan_ok=True)
 
 
 @given(st.one_of(number_samples, time_samples))
 def test_sample_does_not_differ_from_itself(sample):
-    found = difference(sample, sample)
-    assert found.median == 0.0 or math.isnan(found.median)
-    assert (found.mean, found.delta) == (0.0, 0.0)
-    assert found.p == 1.0 or math.isnan(found.p)
+    result = difference(sample, sample)
+    assert result.median == 0.0 or math.isnan(result.median)
+    assert (result.mean, result.delta) == (0.0, 0.0)
+    assert result.p == 1.0 or math.isnan(result.p)
 
 
 @pytest.mark.parametrize("pair", [(numbers([]), numbers([1.0])), (times([]), times([])), (times([2.0]), times([]))])
 def test_difference_with_an_empty_sample_is_nan(pair):
-    found = difference(*pair)
-    assert found.pairs == 0
-    assert all(math.isnan(value) for value in (found.median, found.mean, found.delta, found.p, *found.mean_interval))
+    result = difference(*pair)
+    assert result.pairs == 0
+    assert all(
+        math.isnan(value) for value in (result.median, result.mean, result.delta, result.p, *result.mean_interval)
+    )
 
 
 def test_times_without_pairs_have_the_difference_of_survivals_medians():
     first = time_sample(treated().value, treated().observed, np.arange(100, 121))
-    found = difference(first, placebo())
-    assert (found.pairs, found.test, found.median) == (0, "log-rank", 8.0 - 23.0)
-    assert found.p == pytest.approx(4.17e-5, rel=0.01)
-    assert found.median_interval.high < 0.0
-    assert found.horizon == 6.0  # when the first was no longer watched
-    assert found.mean == pytest.approx(np.minimum(placebo().value, 6.0).mean() - 6.0)
+    result = difference(first, placebo())
+    assert (result.pairs, result.test, result.median) == (0, "log-rank", 8.0 - 23.0)
+    assert result.p == pytest.approx(4.17e-5, rel=0.01)
+    assert result.median_interval.high < 0.0
+    assert result.horizon == 6.0  # when the first was no longer watched
+    assert result.mean == pytest.approx(np.minimum(placebo().value, 6.0).mean() - 6.0)
 
 
 def test_median_beyond_the_limit_leaves_its_difference_unknown():
     rng = np.random.default_rng(2)
-    found = difference(censored(rng.exponential(5.0, 40), 50.0), censored(rng.exponential(500.0, 40), 50.0))
-    assert math.isnan(found.median)
-    assert found.median_interval.low > 30.0
-    assert found.median_interval.high == math.inf
-    assert found.delta > 0.9
-    assert (found.test, found.horizon) == ("paired Gehan", 50.0)
-    assert found.p < 1e-6
-    assert 30.0 < found.mean_interval.low < found.mean < found.mean_interval.high < 50.0
+    result = difference(censored(rng.exponential(5.0, 40), 50.0), censored(rng.exponential(500.0, 40), 50.0))
+    assert math.isnan(result.median)
+    assert result.median_interval.low > 30.0
+    assert result.median_interval.high == math.inf
+    assert result.delta > 0.9
+    assert (result.test, result.horizon) == ("paired Gehan", 50.0)
+    assert result.p < 1e-6
+    assert 30.0 < result.mean_interval.low < result.mean < result.mean_interval.high < 50.0
 
 
 def test_medians_both_beyond_the_limit_leave_the_difference_unbounded():
     rng = np.random.default_rng(2)
-    found = difference(censored(rng.exponential(500.0, 40), 50.0), censored(rng.exponential(500.0, 40), 50.0))
-    assert found.median_interval == (-math.inf, math.inf)
+    result = difference(censored(rng.exponential(500.0, 40), 50.0), censored(rng.exponential(500.0, 40), 50.0))
+    assert result.median_interval == (-math.inf, math.inf)
 
 
 @pytest.mark.parametrize("shared", [True, False])
@@ -121,14 +123,14 @@ def test_intervals_of_differences_cover_as_often_as_they_say(shared):
     seeds = np.arange(25) if shared else np.arange(100, 125)
     for _ in range(100):
         one, other = rng.normal(0.0, 1.0, 25), rng.normal(0.5, 1.0, 25)
-        found = difference(numbers(one), numbers(other, seeds))
-        covered["numbers"] += found.median_interval.low <= 0.5 <= found.median_interval.high
-        covered["means"] += found.mean_interval.low <= 0.5 <= found.mean_interval.high
+        result = difference(numbers(one), numbers(other, seeds))
+        covered["numbers"] += result.median_interval.low <= 0.5 <= result.median_interval.high
+        covered["means"] += result.mean_interval.low <= 0.5 <= result.mean_interval.high
         one, other = rng.exponential(10.0, 25), rng.exponential(20.0, 25)
         later = time_sample(np.minimum(other, 40.0), other <= 40.0, seeds)
-        found = difference(censored(one, 40.0), later)
+        result = difference(censored(one, 40.0), later)
         truth = 10.0 * math.log(2.0)
-        covered["times"] += found.median_interval.low <= truth <= found.median_interval.high
+        covered["times"] += result.median_interval.low <= truth <= result.median_interval.high
     assert 88 <= covered["means"] <= 99
     assert covered["numbers"] >= 88
     assert covered["times"] >= 88
@@ -198,10 +200,10 @@ def test_hedges_g_is_none_where_nothing_varies(pair):
 
 
 def test_log_rank_test_of_the_leukaemia_trial_is_that_of_textbooks():
-    found = log_rank(treated(), placebo())
-    assert found.z**2 == pytest.approx(16.79, abs=0.005)
-    assert found.z < 0.0
-    assert found.p == pytest.approx(4.17e-5, rel=0.01)
+    test = log_rank(treated(), placebo())
+    assert test.z**2 == pytest.approx(16.79, abs=0.005)
+    assert test.z < 0.0
+    assert test.p == pytest.approx(4.17e-5, rel=0.01)
 
 
 @pytest.mark.parametrize(

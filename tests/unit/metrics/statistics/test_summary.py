@@ -26,31 +26,31 @@ from tests.support.metrics.samples import number_samples, numbers, placebo, time
 
 
 def test_quartiles_and_mean_of_numbers_are_numpys():
-    found = summary(numbers([1.0, 2.0, 4.0, 10.0, np.nan]))
-    assert (found.n, found.undefined, found.censored) == (4, 1, 0.0)
-    assert (found.q25, found.q50, found.q75, found.mean) == (1.75, 3.0, 5.5, 4.25)
+    result = summary(numbers([1.0, 2.0, 4.0, 10.0, np.nan]))
+    assert (result.n, result.undefined, result.censored) == (4, 1, 0.0)
+    assert (result.q25, result.q50, result.q75, result.mean) == (1.75, 3.0, 5.5, 4.25)
 
 
 def test_times_have_quartiles_of_survival_and_those_beyond_the_limit_are_none():
-    found = summary(treated())
-    assert (found.n, found.q25, found.q50, found.limit) == (21, 13.0, 23.0, 35.0)
-    assert found.censored == pytest.approx(12 / 21)
-    assert math.isnan(found.q75)
-    assert found.q50_interval == (13.0, math.inf)
+    result = summary(treated())
+    assert (result.n, result.q25, result.q50, result.limit) == (21, 13.0, 23.0, 35.0)
+    assert result.censored == pytest.approx(12 / 21)
+    assert math.isnan(result.q75)
+    assert result.q50_interval == (13.0, math.inf)
     assert summary(placebo()).mean == pytest.approx(182 / 21)
 
 
 @pytest.mark.parametrize("sample", [numbers([]), times([])])
 def test_summary_of_an_empty_sample_is_nan(sample):
-    found = summary(sample)
-    assert found.n == 0
-    assert all(math.isnan(value) for value in (found.q50, found.mean, found.censored, *found.mean_interval))
+    result = summary(sample)
+    assert result.n == 0
+    assert all(math.isnan(value) for value in (result.q50, result.mean, result.censored, *result.mean_interval))
 
 
 def test_summary_of_one_value_has_no_interval():
-    found = summary(numbers([3.0]))
-    assert (found.q25, found.q50, found.mean) == (3.0, 3.0, 3.0)
-    assert all(math.isnan(end) for end in (*found.q50_interval, *found.mean_interval))
+    result = summary(numbers([3.0]))
+    assert (result.q25, result.q50, result.mean) == (3.0, 3.0, 3.0)
+    assert all(math.isnan(end) for end in (*result.q50_interval, *result.mean_interval))
 
 
 @given(number_samples)
@@ -88,10 +88,10 @@ def test_whole_seeds_are_resampled(rows):
     assert seeds == len(set(seed.tolist()))
     for resample in range(5):
         # Where each value has a seed of its own, the n-th count of a median is that of the n-th in rising order.
-        often, of = counts[resample].astype(int), np.sort(value) if seeds == len(value) else value
+        often, drawn = counts[resample].astype(int), np.sort(value) if seeds == len(value) else value
         assert all(len(set(often[seed == one].tolist())) == 1 for one in seed)
         assert means[resample] == pytest.approx(np.repeat(value, often).mean(), abs=1e-6)
-        assert medians[resample] == pytest.approx(np.median(np.repeat(of, often)))
+        assert medians[resample] == pytest.approx(np.median(np.repeat(drawn, often)))
 
 
 def tiled(sample, copies):
@@ -132,9 +132,9 @@ def test_intervals_cover_as_often_as_they_say(n):
     rng = np.random.default_rng(n)
     mean = median = 0
     for _ in range(500):
-        found = summary(numbers(rng.normal(3.0, 2.0, n)))
-        mean += found.mean_interval.low <= 3.0 <= found.mean_interval.high
-        median += found.q50_interval.low <= 3.0 <= found.q50_interval.high
+        result = summary(numbers(rng.normal(3.0, 2.0, n)))
+        mean += result.mean_interval.low <= 3.0 <= result.mean_interval.high
+        median += result.q50_interval.low <= 3.0 <= result.q50_interval.high
     assert 0.915 <= mean / 500 <= 0.985
     assert 0.915 <= median / 500 <= 0.995
 
@@ -218,14 +218,14 @@ def test_errors_of_resampled_means_are_those_of_the_seeds_drawn(rows):
 
 
 def test_interval_of_the_mean_of_a_skewed_sample_reaches_farther_on_the_long_side():
-    found = summary(numbers(np.exp(np.linspace(-2.0, 2.0, 20))))
-    assert found.mean_interval.high - found.mean > 1.3 * (found.mean - found.mean_interval.low)
+    result = summary(numbers(np.exp(np.linspace(-2.0, 2.0, 20))))
+    assert result.mean_interval.high - result.mean > 1.3 * (result.mean - result.mean_interval.low)
 
 
 @pytest.mark.parametrize("value", [[0.0] * 7 + [1.0], [1.0, 2.0], [0.0] * 30 + [1e9]])
 def test_interval_of_the_mean_of_few_distinct_values_is_finite(value):
-    found = summary(numbers(value))
-    assert -math.inf < found.mean_interval.low < found.mean < found.mean_interval.high < math.inf
+    result = summary(numbers(value))
+    assert -math.inf < result.mean_interval.low < result.mean < result.mean_interval.high < math.inf
 
 
 @pytest.mark.parametrize("value", [0.1, 0.9809, 1e-200, 1e12 / 3])

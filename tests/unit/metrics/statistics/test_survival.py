@@ -29,13 +29,13 @@ def at(curve, column, time):
 
 def test_survival_of_the_leukaemia_trial_is_that_of_textbooks():
     curve = kaplan_meier(treated())
-    known = {6: 0.8571, 7: 0.8067, 10: 0.7529, 13: 0.6902, 16: 0.6275, 22: 0.5378, 23: 0.4482}
-    for time, survival in known.items():
+    published = {6: 0.8571, 7: 0.8067, 10: 0.7529, 13: 0.6902, 16: 0.6275, 22: 0.5378, 23: 0.4482}
+    for time, survival in published.items():
         assert at(curve, "survival", time) == pytest.approx(survival, abs=5e-5)
     error = {6: 0.0764, 7: 0.0869, 10: 0.0963, 13: 0.1068, 16: 0.1141, 22: 0.1282, 23: 0.1346}
     for time, standard_error in error.items():
-        found = at(curve, "survival", time) * math.sqrt(at(curve, "variance", time))
-        assert found == pytest.approx(standard_error, abs=5e-5)
+        deviation = at(curve, "survival", time) * math.sqrt(at(curve, "variance", time))
+        assert deviation == pytest.approx(standard_error, abs=5e-5)
     assert (curve.quantile(0.25), curve.quantile(0.5)) == (13.0, 23.0)
     assert math.isnan(curve.quantile(0.75))
     assert kaplan_meier(placebo()).quantile(0.5) == 8.0
@@ -84,17 +84,17 @@ def test_other_units_of_time_give_the_same_quantile_in_that_unit(sample, share, 
 @given(time_samples, shares)
 def test_resample_of_each_value_once_has_the_quantile_of_the_sample(sample, share):
     quantile = kaplan_meier(sample).quantile(share)
-    found = resampled_quantiles(sample, np.ones((1, len(sample))), share)[0]
-    assert found == (math.inf if math.isnan(quantile) else quantile)
+    resampled = resampled_quantiles(sample, np.ones((1, len(sample))), share)[0]
+    assert resampled == (math.inf if math.isnan(quantile) else quantile)
 
 
 @given(time_samples, shares)
 def test_quantiles_of_resamples_are_those_of_the_values_drawn(sample, share):
     counts = draw_counts(len(sample))[:5]
-    for count, found in zip(counts, resampled_quantiles(sample, counts, share), strict=True):
+    for count, resampled in zip(counts, resampled_quantiles(sample, counts, share), strict=True):
         picked = np.repeat(np.arange(len(sample)), count.astype(np.int64))
         quantile = kaplan_meier(times(sample.value[picked], sample.observed[picked])).quantile(share)
-        assert found == (math.inf if math.isnan(quantile) else quantile)
+        assert resampled == (math.inf if math.isnan(quantile) else quantile)
 
 
 def test_restricted_mean_of_uncensored_times_is_their_mean_up_to_horizon():
@@ -150,10 +150,10 @@ def test_surely_less_and_surely_greater_are_inverse(one, other):
 
 
 def test_censored_time_is_after_times_before_it_and_before_none():
-    waited, seen = times([5.0], [False]), times([4.0, 5.0, 6.0])
-    assert surely_less(waited, seen).tolist() == [2]
-    assert surely_greater(waited, seen).tolist() == [0]
-    assert surely_greater(seen, waited).tolist() == [1, 1, 0]
+    waited, observed = times([5.0], [False]), times([4.0, 5.0, 6.0])
+    assert surely_less(waited, observed).tolist() == [2]
+    assert surely_greater(waited, observed).tolist() == [0]
+    assert surely_greater(observed, waited).tolist() == [1, 1, 0]
     assert surely_less(waited, waited).tolist() == [0]
 
 
@@ -178,13 +178,13 @@ def test_p_of_pairs_is_near_that_of_all_swaps_within_pairs(seed):
 def test_pairs_that_are_alike_are_found_different_as_seldom_as_they_should():
     """5 % of 1000 are 50, 7 around; beyond 30 and 72 by chance once in 1000 lists of seeds."""
     rng = np.random.default_rng(8)
-    found = 0
+    rejections = 0
     for _ in range(1000):
         share = rng.exponential(10.0, 25)
         values = (share + rng.exponential(5.0, 25) for _ in range(2))
         one, other = (times(np.minimum(value, 20.0), value <= 20.0) for value in values)
-        found += paired_p(one, other) < 0.05
-    assert 30 <= found <= 72
+        rejections += paired_p(one, other) < 0.05
+    assert 30 <= rejections <= 72
 
 
 @pytest.mark.parametrize("observed", [[True, True], [False, False]])

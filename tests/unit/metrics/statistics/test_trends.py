@@ -43,9 +43,11 @@ def test_lower_aic_is_that_of_the_true_form(seed):
 
 
 def test_fit_evaluates_performance_at_a_stress():
-    of = {"a_interval": UNKNOWN, "b_interval": UNKNOWN, "r_squared": 1.0, "aic": 0.0}
-    assert Fit("linear", 1.0, -0.5, **of).evaluate(np.array([0.0, 0.4])).tolist() == pytest.approx([1.0, 0.8])
-    assert Fit("exponential", 2.0, -1.0, **of).evaluate(np.array([0.5])).tolist() == pytest.approx([2 * math.exp(-0.5)])
+    fields = {"a_interval": UNKNOWN, "b_interval": UNKNOWN, "r_squared": 1.0, "aic": 0.0}
+    assert Fit("linear", 1.0, -0.5, **fields).evaluate(np.array([0.0, 0.4])).tolist() == pytest.approx([1.0, 0.8])
+    assert Fit("exponential", 2.0, -1.0, **fields).evaluate(np.array([0.5])).tolist() == pytest.approx(
+        [2 * math.exp(-0.5)]
+    )
 
 
 def test_linear_degradation_is_the_fit_of_least_squares():
@@ -133,30 +135,30 @@ ROBOTS = np.array([1.0, 2.0, 5.0, 10.0])
 
 def test_robots_that_do_not_hinder_one_another_are_wholly_efficient():
     work, times = scaling(ROBOTS, 3.0 * ROBOTS, is_time=False), scaling(ROBOTS, 60.0 / ROBOTS, is_time=True)
-    for found in (work, times):
-        np.testing.assert_allclose(found.speed_up, ROBOTS)
-        np.testing.assert_allclose(found.efficiency, 1.0)
-        np.testing.assert_allclose(found.serial_fraction, [np.nan, 0.0, 0.0, 0.0], atol=1e-12)
+    for result in (work, times):
+        np.testing.assert_allclose(result.speed_up, ROBOTS)
+        np.testing.assert_allclose(result.efficiency, 1.0)
+        np.testing.assert_allclose(result.serial_fraction, [np.nan, 0.0, 0.0, 0.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("serial", [0.05, 0.3, 1.0])
 def test_amdahls_law_has_its_serial_fraction(serial):
-    found = scaling(ROBOTS, serial + (1.0 - serial) / ROBOTS, is_time=True)
-    np.testing.assert_allclose(found.serial_fraction[1:], serial)
+    result = scaling(ROBOTS, serial + (1.0 - serial) / ROBOTS, is_time=True)
+    np.testing.assert_allclose(result.serial_fraction[1:], serial)
 
 
 def test_without_a_single_robot_the_smallest_swarm_is_the_reference():
-    found = scaling(np.array([20.0, 5.0, 10.0]), np.array([40.0, 20.0, 30.0]), is_time=False)
-    assert found.reference == 5.0
-    np.testing.assert_allclose(found.speed_up, [2.0, 1.0, 1.5])
-    np.testing.assert_allclose(found.efficiency, [0.5, 1.0, 0.75])
-    np.testing.assert_allclose(found.serial_fraction, [1.0 / 3.0, np.nan, 1.0 / 3.0])
+    result = scaling(np.array([20.0, 5.0, 10.0]), np.array([40.0, 20.0, 30.0]), is_time=False)
+    assert result.reference == 5.0
+    np.testing.assert_allclose(result.speed_up, [2.0, 1.0, 1.5])
+    np.testing.assert_allclose(result.efficiency, [0.5, 1.0, 0.75])
+    np.testing.assert_allclose(result.serial_fraction, [1.0 / 3.0, np.nan, 1.0 / 3.0])
 
 
 def test_times_that_are_not_known_have_no_efficiency_and_resamples_go_row_by_row():
     response = np.array([[60.0, 30.0, np.nan, 0.0], [60.0, 60.0, 60.0, 60.0]])
-    found = scaling(ROBOTS, response, is_time=True)
-    np.testing.assert_allclose(found.efficiency, [[1.0, 1.0, np.nan, np.nan], 1.0 / ROBOTS])
+    result = scaling(ROBOTS, response, is_time=True)
+    np.testing.assert_allclose(result.efficiency, [[1.0, 1.0, np.nan, np.nan], 1.0 / ROBOTS])
 
 
 @pytest.mark.parametrize("robots", [[1.0], [1.0, 1.0], [0.0, 1.0], []])
@@ -179,15 +181,15 @@ def brute_force(table):
 
 
 def test_step_is_found_with_its_size():
-    found = change_point(LOSS, noise(1) + np.where(LOSS >= 0.4, 0.3, 0.9)[:, None])
-    assert found is not None
-    assert (found.after, found.before, found.position) == (0.3, 0.4, pytest.approx(0.35))
-    assert found.position_interval.low == found.position_interval.high == found.position
-    assert found.below == pytest.approx(0.9, abs=0.03)
-    assert found.effect == pytest.approx(-0.6, abs=0.04)
-    assert found.effect_interval.low < -0.6 < found.effect_interval.high
-    assert found.standardised == pytest.approx(-6.0, rel=0.2)
-    assert found.gain > 0.0
+    step = change_point(LOSS, noise(1) + np.where(LOSS >= 0.4, 0.3, 0.9)[:, None])
+    assert step is not None
+    assert (step.after, step.before, step.position) == (0.3, 0.4, pytest.approx(0.35))
+    assert step.position_interval.low == step.position_interval.high == step.position
+    assert step.below == pytest.approx(0.9, abs=0.03)
+    assert step.effect == pytest.approx(-0.6, abs=0.04)
+    assert step.effect_interval.low < -0.6 < step.effect_interval.high
+    assert step.standardised == pytest.approx(-6.0, rel=0.2)
+    assert step.gain > 0.0
 
 
 def test_step_is_found_in_noise_once_in_a_hundred_at_most():
@@ -201,8 +203,8 @@ def test_straight_line_has_no_step(points):
     loss = np.linspace(0.0, 0.9, points)
     exact = np.broadcast_to((1.0 - loss)[:, None], (points, 10))
     assert change_point(loss, exact) is None
-    found = [exact + np.random.default_rng(seed).normal(0.0, 0.02, exact.shape) for seed in range(20)]
-    assert not any(change_point(loss, table) for table in found)
+    tables = [exact + np.random.default_rng(seed).normal(0.0, 0.02, exact.shape) for seed in range(20)]
+    assert not any(change_point(loss, table) for table in tables)
 
 
 def test_cliff_is_a_step_and_neither_line_nor_exponential():
@@ -220,18 +222,18 @@ def test_cliff_is_a_step_and_neither_line_nor_exponential():
 
 
 def test_small_step_in_much_noise_has_a_wide_interval_that_holds_it():
-    found = change_point(LOSS, noise(3) + np.where(LOSS >= 0.4, 0.08, 0.0)[:, None])
-    assert found is not None
-    assert found.position_interval.low < found.position_interval.high
-    assert found.position_interval.low <= 0.35 <= found.position_interval.high
+    step = change_point(LOSS, noise(3) + np.where(LOSS >= 0.4, 0.08, 0.0)[:, None])
+    assert step is not None
+    assert step.position_interval.low < step.position_interval.high
+    assert step.position_interval.low <= 0.35 <= step.position_interval.high
 
 
 @given(st.integers(0, 10_000), st.integers(1, 7))
 def test_step_is_where_brute_force_finds_it(seed, split):
     table = noise(seed) + np.where(np.arange(8) >= split, 1.0, 0.0)[:, None]
-    found = change_point(LOSS, table)
-    assert found is not None
-    assert found.after == LOSS[brute_force(table)]
+    step = change_point(LOSS, table)
+    assert step is not None
+    assert step.after == LOSS[brute_force(table)]
 
 
 @given(st.integers(0, 10_000), st.floats(0.1, 10.0), st.sampled_from((0.0, -3.0, 1e7)))
@@ -248,9 +250,9 @@ def test_points_and_runs_without_values_are_left_out():
     table = noise(1) + np.where(LOSS >= 0.4, 1.0, 0.0)[:, None]
     table[2] = np.nan
     table[5, :7] = np.nan
-    found = change_point(LOSS, table)
-    assert found is not None
-    assert (found.after, found.before) == (0.3, 0.4)
+    step = change_point(LOSS, table)
+    assert step is not None
+    assert (step.after, step.before) == (0.3, 0.4)
 
 
 @pytest.mark.parametrize(
@@ -261,9 +263,9 @@ def test_constant_response_has_no_step(table):
 
 
 def test_step_without_noise_is_found():
-    found = change_point(LOSS, np.where(LOSS >= 0.4, 1.0, 0.0)[:, None] * np.ones(5))
-    assert found is not None
-    assert (found.position, found.effect, found.standardised) == (pytest.approx(0.35), 1.0, math.inf)
+    step = change_point(LOSS, np.where(LOSS >= 0.4, 1.0, 0.0)[:, None] * np.ones(5))
+    assert step is not None
+    assert (step.position, step.effect, step.standardised) == (pytest.approx(0.35), 1.0, math.inf)
 
 
 def test_sums_of_resamples_are_those_of_the_seeds_drawn():

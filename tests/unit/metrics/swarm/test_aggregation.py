@@ -58,15 +58,15 @@ TICK_S = 0.1
 def at_ticks(together, robots=5):
     """Truths in which so many robots of each arena stand in a heap, the others far apart: (ticks, arenas)."""
     table = np.atleast_2d(np.array(together).T).T
-    place = np.zeros((*table.shape, robots, 2))
-    place[..., 0] = np.where(np.arange(robots) < table[..., None], 0.01, 0.4) * np.arange(robots)
-    swarms = [stand(*tick.reshape(-1, 2), arenas=table.shape[1]) for tick in place]
+    position = np.zeros((*table.shape, robots, 2))
+    position[..., 0] = np.where(np.arange(robots) < table[..., None], 0.01, 0.4) * np.arange(robots)
+    swarms = [stand(*tick.reshape(-1, 2), arenas=table.shape[1]) for tick in position]
     return swarms[0].of, [swarm.seen(tick) for tick, swarm in enumerate(swarms)]
 
 
 def time_s(together, robots=5, **parameters):
-    of, ticks = at_ticks(together, robots)
-    return told(AggregationTime(**parameters), *ticks, of=of)
+    run, ticks = at_ticks(together, robots)
+    return told(AggregationTime(**parameters), *ticks, of=run)
 
 
 @pytest.mark.parametrize(

@@ -13,18 +13,18 @@ from tests.support.metrics.swarms import away_m, rolled, said, stand, swarms, to
 from tests.support.metrics.truths import measured, poses, static, truth
 
 
-def speed(velocity, **given) -> float:
-    of = static(len(velocity))
-    return measured("speed", of, truth(of, velocity=np.array(velocity, float), **given))[0]
+def speed(velocity, **fields) -> float:
+    run = static(len(velocity))
+    return measured("speed", run, truth(run, velocity=np.array(velocity, float), **fields))[0]
 
 
 def test_speed_is_the_mean_over_robots_in_any_direction():
     assert speed([[0.3, 0.4, 0.0], [-0.1, 0.0, 0.0], [0.0, 0.0, 9.0]]) == pytest.approx(0.2)
 
 
-def efficiency(place, alive=None, boundary="open", arenas=1):
+def efficiency(position, alive=None, boundary="open", arenas=1):
     """What is told at the last of ticks with places (ticks, rows, 2)."""
-    swarms = [stand(*tick, boundary=boundary, arenas=arenas) for tick in np.asarray(place, float)]
+    swarms = [stand(*tick, boundary=boundary, arenas=arenas) for tick in np.asarray(position, float)]
     alive = np.ones((len(swarms), len(swarms[0].pose)), np.bool_) if alive is None else alive
     ticks = [
         replace(swarm, alive=living).seen(tick) for tick, (swarm, living) in enumerate(zip(swarms, alive, strict=True))
@@ -42,11 +42,11 @@ def test_path_efficiency_of_line_return_and_half_circle_is_known():
 
 
 def test_path_efficiency_leaves_out_robots_that_did_not_move():
-    place = np.zeros((3, 2, 2))
-    place[:, 0, 0] = 0.0, 0.1, 0.2
-    place[:, 1, 0] = 0.0, 0.001, 0.0
-    assert efficiency(place) == [pytest.approx(1.0)]
-    assert np.isnan(efficiency(place[:, 1:])).all()
+    position = np.zeros((3, 2, 2))
+    position[:, 0, 0] = 0.0, 0.1, 0.2
+    position[:, 1, 0] = 0.0, 0.001, 0.0
+    assert efficiency(position) == [pytest.approx(1.0)]
+    assert np.isnan(efficiency(position[:, 1:])).all()
 
 
 def test_path_efficiency_of_a_random_walk_has_the_known_mean():
@@ -56,8 +56,8 @@ def test_path_efficiency_of_a_random_walk_has_the_known_mean():
     """
     walks, steps = 500, 100
     turn = np.random.default_rng(1).uniform(-np.pi, np.pi, (steps, walks))
-    place = np.concatenate([np.zeros((1, walks, 2)), np.cumsum(np.stack([np.cos(turn), np.sin(turn)], -1), axis=0)])
-    assert efficiency(place) == [pytest.approx(0.0887, abs=5 * np.sqrt(0.22 / steps / walks) + 5e-5)]
+    position = np.concatenate([np.zeros((1, walks, 2)), np.cumsum(np.stack([np.cos(turn), np.sin(turn)], -1), axis=0)])
+    assert efficiency(position) == [pytest.approx(0.0887, abs=5 * np.sqrt(0.22 / steps / walks) + 5e-5)]
 
 
 @given(st.integers(0, 1000), st.integers(1, 20), st.sampled_from(["open", "torus"]))
@@ -73,10 +73,10 @@ def test_path_efficiency_is_that_of_the_formula(seed, ticks, boundary):
             if alive[-1, robot] and length_m >= 0.01:
                 shares.append(np.hypot(*(unrolled[-1, robot] - unrolled[0, robot])) / length_m)
         values.append(np.mean(shares) if shares else np.nan)
-    place = rolled(unrolled) if boundary == "torus" else unrolled
-    found = efficiency(place, alive, boundary, arenas=2)
-    assert found == pytest.approx(values, rel=1e-6, nan_ok=True)
-    assert all(np.isnan(value) or 0.0 <= value <= 1.0 for value in found)
+    position = rolled(unrolled) if boundary == "torus" else unrolled
+    efficiencies = efficiency(position, alive, boundary, arenas=2)
+    assert efficiencies == pytest.approx(values, rel=1e-6, nan_ok=True)
+    assert all(np.isnan(value) or 0.0 <= value <= 1.0 for value in efficiencies)
 
 
 PER_MIN = 60 * 10  # ticks
@@ -86,10 +86,10 @@ def oscillation(turn_radps, alive=None, arenas=1, **parameters):
     """What is told at the last of ticks with these turning commands, (ticks, rows)."""
     turn = np.asarray(turn_radps, float)
     alive = np.ones(turn.shape, np.bool_) if alive is None else alive
-    of = static(turn.shape[1] // arenas, arenas=arenas)
+    run = static(turn.shape[1] // arenas, arenas=arenas)
     command = np.stack([0 * turn, turn, 0 * turn], axis=-1)
-    ticks = [truth(of, tick, command=command[tick], alive=alive[tick]) for tick in range(len(turn))]
-    return told(Oscillation(**parameters), *ticks, of=of)
+    ticks = [truth(run, tick, command=command[tick], alive=alive[tick]) for tick in range(len(turn))]
+    return told(Oscillation(**parameters), *ticks, of=run)
 
 
 @pytest.mark.parametrize(
@@ -103,8 +103,8 @@ def oscillation(turn_radps, alive=None, arenas=1, **parameters):
     ],
 )
 def test_changes_of_side_beyond_the_dead_band_count(turn_radps, dead_band_radps, changes_per_tick):
-    found = oscillation([[turn] for turn in turn_radps], dead_band_radps=dead_band_radps)
-    assert found == [pytest.approx(changes_per_tick * PER_MIN)]
+    rates = oscillation([[turn] for turn in turn_radps], dead_band_radps=dead_band_radps)
+    assert rates == [pytest.approx(changes_per_tick * PER_MIN)]
 
 
 def test_dead_robots_neither_count_nor_remember_in_oscillation():
@@ -134,20 +134,20 @@ def test_oscillation_is_that_of_the_definition(seed, ticks):
     [([0.7] * 9, 1.0), ([0.3, 0.3 + np.pi, -1.0, -1.0 - np.pi], 0.0), ([0.0, np.pi / 2], np.sqrt(0.5))],
 )
 def test_headings_that_agree_cancel_or_stand_at_a_right_angle_have_the_known_order(heading_rad, exact):
-    of = static(len(heading_rad))
-    assert measured("order", of, truth(of, pose=poses(heading_rad))) == [pytest.approx(exact, abs=1e-15)]
+    run = static(len(heading_rad))
+    assert measured("order", run, truth(run, pose=poses(heading_rad))) == [pytest.approx(exact, abs=1e-15)]
 
 
 @pytest.mark.parametrize(("robots", "exact"), [(5, 0.402), (10, 0.282), (40, 0.1404), (100, 0.0887), (400, 0.0445)])
 def test_headings_at_random_have_the_known_mean_order(robots, exact):
     """E[order^2] = 1/N gives a variance below 0.22/N; 5 standard errors of 2000 samples: false alarm 6e-7."""
     samples = 2000
-    of = static(robots, arenas=samples)
+    run = static(robots, arenas=samples)
     heading_rad = np.random.default_rng(1).uniform(-np.pi, np.pi, samples * robots)
-    found = np.array(measured("order", of, truth(of, pose=poses(heading_rad))))
+    order = np.array(measured("order", run, truth(run, pose=poses(heading_rad))))
     tolerance = 5 * np.sqrt(0.22 / robots / samples) + 0.0005  # and the rounding of the table
-    assert found.mean() == pytest.approx(exact, abs=tolerance)
-    assert np.square(found).mean() == pytest.approx(1 / robots, rel=5 / np.sqrt(samples))
+    assert order.mean() == pytest.approx(exact, abs=tolerance)
+    assert np.square(order).mean() == pytest.approx(1 / robots, rel=5 / np.sqrt(samples))
 
 
 ranges = st.sampled_from([0.1, 1.0, 3.5])
@@ -176,15 +176,15 @@ def test_headings_at_random_have_no_local_order():
     """A mean of 400 x 190 cosines of pairs, variance 1/2 each and uncorrelated: 5 standard errors, false alarm 6e-7."""
     rng, arenas, robots = np.random.default_rng(1), 400, 20
     pose = np.column_stack([np.zeros((arenas * robots, 2)), rng.uniform(-np.pi, np.pi, arenas * robots)])
-    found = np.array(said("order_local", stand(*pose, arenas=arenas)))
-    assert found.mean() == pytest.approx(0.0, abs=5 * np.sqrt(0.5 / (arenas * robots * (robots - 1) / 2)))
+    order = np.array(said("order_local", stand(*pose, arenas=arenas)))
+    assert order.mean() == pytest.approx(0.0, abs=5 * np.sqrt(0.5 / (arenas * robots * (robots - 1) / 2)))
 
 
 def order_of_velocities(*velocity):
-    of = static(len(velocity))
+    run = static(len(velocity))
     table = np.zeros((len(velocity), 3))
     table[:, :2] = velocity
-    return measured("order_velocity", of, truth(of, velocity=table))[0]
+    return measured("order_velocity", run, truth(run, velocity=table))[0]
 
 
 def test_robots_count_by_their_speed():

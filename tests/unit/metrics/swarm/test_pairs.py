@@ -43,12 +43,12 @@ def test_near_pairs_are_those_of_all_pairs_each_once_whatever_the_reaches(swarm,
 @pytest.mark.parametrize("boundary", ["walls", "torus"])
 def test_near_pairs_of_many_moving_robots_are_found_tick_by_tick(boundary):
     rng = np.random.default_rng(1)
-    place = rng.uniform([-4.0, -3.0], [4.0, 3.0], (200, 2))
+    position = rng.uniform([-4.0, -3.0], [4.0, 3.0], (200, 2))
     reach_m = rng.choice([0.02, 0.3], 200)
-    finder = NearPairs(stand(*place, boundary=boundary).of, reach_m)
+    finder = NearPairs(stand(*position, boundary=boundary).of, reach_m)
     for _ in range(5):
-        place = rolled(place + rng.normal(0.0, 0.2, place.shape))
-        swarm = stand(*place, boundary=boundary)
+        position = rolled(position + rng.normal(0.0, 0.2, position.shape))
+        swarm = stand(*position, boundary=boundary)
         assert pairs_found(swarm, reach_m, finder) == all_pairs(swarm, reach_m)
 
 
@@ -113,11 +113,11 @@ def test_robots_at_random_have_the_known_mean():
     5 standard errors of 100 x 48 robots, their square doubled since neighbours share distances: false alarm below 6e-7.
     """
     arenas, robots = 100, 48
-    place = np.random.default_rng(1).uniform([-4.0, -3.0], [4.0, 3.0], (arenas * robots, 2))
-    found = np.array(said("nearest_neighbour", stand(*place, boundary="torus", arenas=arenas)))
+    position = np.random.default_rng(1).uniform([-4.0, -3.0], [4.0, 3.0], (arenas * robots, 2))
+    nearest_m = np.array(said("nearest_neighbour", stand(*position, boundary="torus", arenas=arenas)))
     exact = 0.5 * np.sqrt(48.0) * np.exp(lgamma(robots) - lgamma(robots + 0.5))
     error = np.sqrt((4.0 - np.pi) / (4.0 * np.pi * robots / 48.0) / (arenas * robots) * 2.0)
-    assert found.mean() == pytest.approx(exact, abs=5.0 * error)
+    assert nearest_m.mean() == pytest.approx(exact, abs=5.0 * error)
 
 
 SPANS = (0.0, 0.1), (0.05, 0.3), (0.1, 0.4), (1.0, 1.05)  # the first and third meet, and do not overlap
@@ -125,10 +125,10 @@ places = st.tuples(st.floats(-4, 4), st.floats(-3, 3), st.sampled_from([0.035, 0
 
 
 def gap(*at, arenas=1, **fields):
-    of = static(len(at) // arenas, arenas=arenas)
+    run = static(len(at) // arenas, arenas=arenas)
     pose = np.zeros((len(at), 3))
     pose[:, :2] = at
-    return measured("min_gap", of, truth(of, pose=pose, **fields))
+    return measured("min_gap", run, truth(run, pose=pose, **fields))
 
 
 def test_gap_is_from_surface_to_surface():
@@ -148,15 +148,15 @@ def test_smallest_gap_of_different_bodies_is_that_of_all_pairs(robots):
     ]
     pose, alive, order = np.stack([x, y, 0 * x], 1), np.ones(len(x), np.bool_), np.arange(len(x))[None]
     nearest = min(pairs, default=np.nan)
-    (told,) = smallest_gap_m(pose, radius, span, alive, order).tolist()
-    assert told == pytest.approx(nearest, abs=1e-12, nan_ok=True)
+    (gap_m,) = smallest_gap_m(pose, radius, span, alive, order).tolist()
+    assert gap_m == pytest.approx(nearest, abs=1e-12, nan_ok=True)
 
 
 def test_drone_above_a_robot_is_not_near_it():
-    of = static(2)
-    (flock,) = of.groups
+    run = static(2)
+    (flock,) = run.groups
     drone = replace(flock, name="air", body=replace(flock.body, altitude_m=1.0), start=2, stop=4)
-    both = replace(of, groups=(flock, drone), robot_names=(*of.robot_names, "air-0", "air-1"))
+    both = replace(run, groups=(flock, drone), robot_names=(*run.robot_names, "air-0", "air-1"))
     pose = np.zeros((4, 3))
     pose[:, :2] = (0, 0), (2, 0), (0, 0), (1, 0)
     assert measured("min_gap", both, truth(both, pose=pose)) == [pytest.approx(0.93)]
@@ -165,34 +165,34 @@ def test_drone_above_a_robot_is_not_near_it():
 
 
 def test_gap_does_not_depend_on_the_order_of_the_tick_before():
-    of, rng = static(30, arenas=2), np.random.default_rng(1)
+    run, rng = static(30, arenas=2), np.random.default_rng(1)
     metrics = Metrics(["min_gap"])
-    metrics.begin(of)
+    metrics.begin(run)
     for tick in range(20):
-        seen = truth(of, tick, pose=rng.uniform(-2.0, 2.0, (60, 3)), alive=rng.random(60) < 0.8)
-        metrics.see(seen)
-        assert metrics.latest["min_gap"].tolist() == measured("min_gap", of, seen)
+        moved = truth(run, tick, pose=rng.uniform(-2.0, 2.0, (60, 3)), alive=rng.random(60) < 0.8)
+        metrics.see(moved)
+        assert metrics.latest["min_gap"].tolist() == measured("min_gap", run, moved)
 
 
-def rate_per_h(of, onsets, alive):
+def rate_per_h(run, onsets, alive):
     """`onsets` (ticks, arenas), `alive` (ticks, rows)."""
     ticks = [
-        truth(of, tick, contact_onsets=np.column_stack([now, 7 + 0 * now]), alive=living)
+        truth(run, tick, contact_onsets=np.column_stack([now, 7 + 0 * now]), alive=living)
         for tick, (now, living) in enumerate(zip(onsets, alive, strict=True))
     ]
-    return told("collision_rate", *ticks, of=of)
+    return told("collision_rate", *ticks, of=run)
 
 
 @given(st.integers(0, 1000), st.integers(1, 20), st.sampled_from([0.0, 0.1, 0.9]))
 def test_collision_rate_is_twice_the_onsets_over_living_robot_time(seed, ticks, dead):
-    rng, of = np.random.default_rng(seed), static(3, arenas=2)
+    rng, run = np.random.default_rng(seed), static(3, arenas=2)
     onsets, alive = rng.integers(0, 3, (ticks, 2)), rng.random((ticks, 6)) >= dead
     alive[:, 3:] &= rng.random() < 0.8
     values = []
     for arena in range(2):
-        robot_h = sum(np.count_nonzero(tick[3 * arena : 3 * arena + 3]) / of.rate_hz / 3600 for tick in alive)
+        robot_h = sum(np.count_nonzero(tick[3 * arena : 3 * arena + 3]) / run.rate_hz / 3600 for tick in alive)
         values.append(2 * sum(tick[arena] for tick in onsets) / robot_h if robot_h else np.nan)
-    assert rate_per_h(of, onsets, alive) == pytest.approx(values, nan_ok=True)
+    assert rate_per_h(run, onsets, alive) == pytest.approx(values, nan_ok=True)
 
 
 def test_robots_that_heed_nobody_collide_at_the_rate_of_the_kinetic_theory():
@@ -201,33 +201,33 @@ def test_robots_that_heed_nobody_collide_at_the_rate_of_the_kinetic_theory():
     Straight paths on a torus; a chord shorter than a tick's way is missed, and takes less than 1 % away.
     """
     robots, arenas, ticks, side_m, diameter_m, speed_mps = 60, 6, 400, 4.0, 0.07, 0.1
-    rng, of = np.random.default_rng(1), static(robots, arenas=arenas)
-    place = rng.uniform(0.0, side_m, (arenas, robots, 2))
+    rng, run = np.random.default_rng(1), static(robots, arenas=arenas)
+    position = rng.uniform(0.0, side_m, (arenas, robots, 2))
     heading = rng.uniform(-np.pi, np.pi, (arenas, robots))
-    step = speed_mps / of.rate_hz * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    step = speed_mps / run.rate_hz * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
     i, j = np.triu_indices(robots, 1)
-    away, closing = place[:, i] - place[:, j], step[:, i] - step[:, j]
+    away, closing = position[:, i] - position[:, j], step[:, i] - step[:, j]
     touching, onsets = [], []
     for tick in range(ticks + 1):
         now = away + tick * closing
         now -= side_m * np.round(now / side_m)
         touching.append((now**2).sum(axis=-1) < diameter_m**2)
         onsets.append(np.count_nonzero(touching[-1] & ~touching[-2], axis=1) if tick else None)
-    found = np.array(rate_per_h(of, onsets[1:], np.ones((ticks, arenas * robots), np.bool_)))
+    rates = np.array(rate_per_h(run, onsets[1:], np.ones((ticks, arenas * robots), np.bool_)))
     exact = 8 / np.pi * robots / side_m**2 * diameter_m * speed_mps * (robots - 1) / robots * 3600
     assert exact == pytest.approx(237, abs=1)
-    expected_onsets = exact * arenas * robots * ticks / of.rate_hz / 3600 / 2
-    assert found.mean() == pytest.approx(exact, rel=5 / np.sqrt(expected_onsets))
+    expected_onsets = exact * arenas * robots * ticks / run.rate_hz / 3600 / 2
+    assert rates.mean() == pytest.approx(exact, rel=5 / np.sqrt(expected_onsets))
 
 
 WINDOW = Deadlocked(window_s=1.0, moved_m=0.05, told_m=0.05)  # of ten ticks
 
 
-def after(place, command, alive=None, boundary="walls", arenas=1):
+def after(position, command, alive=None, boundary="walls", arenas=1):
     """What is told at the last of ticks with places (ticks, rows, 2) and commands (ticks, rows, 3)."""
-    alive = np.ones(np.shape(place)[:2], np.bool_) if alive is None else alive
+    alive = np.ones(np.shape(position)[:2], np.bool_) if alive is None else alive
     swarms = [
-        replace(stand(*at, boundary=boundary, arenas=arenas), alive=a) for at, a in zip(place, alive, strict=True)
+        replace(stand(*at, boundary=boundary, arenas=arenas), alive=a) for at, a in zip(position, alive, strict=True)
     ]
     ticks = [swarm.seen(tick, command=command[tick]) for tick, swarm in enumerate(swarms)]
     return told(WINDOW, *ticks, of=swarms[0].of)
@@ -246,15 +246,15 @@ AHEAD, TURN, ASIDE = np.tile([0.1, 0, 0], (11, 1)), np.tile([0, 1.0, 0], (11, 1)
 
 
 def test_deadlocked_robot_is_one_that_drives_without_moving():
-    still, gone = path((0, 0)), path((0.01, 0))
-    assert after(robots(still, gone, still, still, still), robots(AHEAD, AHEAD, TURN, TURN, ASIDE)) == [0.4]
+    still, driven = path((0, 0)), path((0.01, 0))
+    assert after(robots(still, driven, still, still, still), robots(AHEAD, AHEAD, TURN, TURN, ASIDE)) == [0.4]
 
 
 @settings(max_examples=50)
 @given(st.integers(0, 1000), st.integers(2, 30), st.sampled_from(["walls", "torus"]))
 def test_deadlocked_robots_are_those_of_the_definition(seed, ticks, boundary):
     rng, window = np.random.default_rng(seed), 10
-    place = rolled(np.cumsum(rng.normal(0.0, 0.02, (ticks, 6, 2)), axis=0) + rng.uniform(-4, 4, (1, 6, 2)))
+    position = rolled(np.cumsum(rng.normal(0.0, 0.02, (ticks, 6, 2)), axis=0) + rng.uniform(-4, 4, (1, 6, 2)))
     command = rng.normal(0.0, 0.06, (ticks, 6, 3)) * (rng.random((1, 6, 1)) < 0.7)
     alive = rng.random((ticks, 6)) < rng.choice([1.0, 0.8, 0.2])
     values = []
@@ -264,9 +264,9 @@ def test_deadlocked_robots_are_those_of_the_definition(seed, ticks, boundary):
             if then < 0 or not alive[-1, robot]:
                 continue
             told_m = sum(np.hypot(*command[k, robot, [0, 2]]) * 0.1 for k in range(then, ticks - 1) if alive[k, robot])
-            away = stand((0, 0), boundary=boundary).shortest(place[-1, robot] - place[then, robot])
+            away = stand((0, 0), boundary=boundary).shortest(position[-1, robot] - position[then, robot])
             stuck += told_m >= 0.05 and np.hypot(*away) < 0.05
         living = np.count_nonzero(alive[-1, own])
         values.append(stuck / living if living and then >= 0 else np.nan)
-    found = after(place, command, alive=alive, boundary=boundary, arenas=2)
-    assert found == pytest.approx(values, nan_ok=True)
+    shares = after(position, command, alive=alive, boundary=boundary, arenas=2)
+    assert shares == pytest.approx(values, nan_ok=True)

@@ -35,12 +35,12 @@ def sensed(rows, **fields):
 
 
 def test_rays_leave_the_rim_where_the_sensors_look_and_end_where_they_read(tmp_path):
-    of, distance_m = static(2, arenas=2), np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.05, 0.05])
+    run, distance_m = static(2, arenas=2), np.array([0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.05, 0.05])
     value = np.zeros((2, 8))
     value[1] = RESPONSE.value(distance_m)
     pose = np.array([[9, 9, 0], [1.0, 2.0, 0.5], [0, 0, 0], [0, 0, 0]])
-    seen = truth(of, pose=pose, readings=sensed([0, 1], proximity_value=value))
-    record(tmp_path / "run.rrd", of, [seen], selected="flock-1")
+    tick = truth(run, pose=pose, readings=sensed([0, 1], proximity_value=value))
+    record(tmp_path / "run.rrd", run, [tick], selected="flock-1")
     lines, _ = rays(tmp_path / "run.rrd")[0]
     outwards = np.stack([np.cos(LOOKS + 0.5), np.sin(LOOKS + 0.5)], axis=1)
     read_m = np.where(value[1] > 0, distance_m, RESPONSE.reach_m)
@@ -52,10 +52,10 @@ def test_rays_leave_the_rim_where_the_sensors_look_and_end_where_they_read(tmp_p
 
 
 def test_ray_has_the_colour_of_its_obstacle_and_noise_counts_as_none(tmp_path):
-    of = static(2)
+    run = static(2)
     pose = np.array([[0, 0, 0], [0.0, 0.09, 0]])  # the other stands on the ray to the left
     value = np.array([[0.5, 0.04, 0.5, 0, 0, 0, 0, 0], [0] * 8], float)
-    record(tmp_path / "run.rrd", of, [truth(of, pose=pose, readings=sensed([0, 1], proximity_value=value))])
+    record(tmp_path / "run.rrd", run, [truth(run, pose=pose, readings=sensed([0, 1], proximity_value=value))])
     _, colors = rays(tmp_path / "run.rrd")[0]
     wall, noise, robot, *nothing = colors
     assert len({wall, noise, robot}) == 3
@@ -63,15 +63,15 @@ def test_ray_has_the_colour_of_its_obstacle_and_noise_counts_as_none(tmp_path):
 
 
 def test_between_its_turns_it_keeps_what_it_sensed_and_the_dead_sense_nothing(tmp_path):
-    of, value = static(1), np.full((1, 8), 0.5)
+    run, value = static(1), np.full((1, 8), 0.5)
     turned = np.array([[0.0, 0.0, 1.0]])
     ticks = [
-        truth(of, 0, readings=sensed([0], proximity_value=value)),
-        truth(of, 1, pose=turned),
-        truth(of, 2, alive=np.array([False])),
-        truth(of, 3, alive=np.array([False])),
+        truth(run, 0, readings=sensed([0], proximity_value=value)),
+        truth(run, 1, pose=turned),
+        truth(run, 2, alive=np.array([False])),
+        truth(run, 3, alive=np.array([False])),
     ]
-    record(tmp_path / "run.rrd", of, ticks)
+    record(tmp_path / "run.rrd", run, ticks)
     drawn = rays(tmp_path / "run.rrd")
     assert {tick: len(lines) for tick, (lines, _) in drawn.items()} == {0: 8, 1: 8, 2: 0}
     turn = np.array([[np.cos(1.0), np.sin(1.0)], [-np.sin(1.0), np.cos(1.0)]])
@@ -80,35 +80,35 @@ def test_between_its_turns_it_keeps_what_it_sensed_and_the_dead_sense_nothing(tm
 
 @pytest.mark.parametrize(("robots", "expected"), [(200, list(range(12))), (201, [0, 4, 5, 10])])
 def test_rays_that_see_nothing_are_thinned_in_large_swarms(tmp_path, robots, expected):
-    of = static(robots)
+    run = static(robots)
     ticks = [
-        truth(of, tick, readings=sensed([0], proximity_value=np.full((1, 8), 0.5 if tick == 4 else 0.0)))
+        truth(run, tick, readings=sensed([0], proximity_value=np.full((1, 8), 0.5 if tick == 4 else 0.0)))
         for tick in range(12)
     ]
-    record(tmp_path / "run.rrd", of, ticks)
+    record(tmp_path / "run.rrd", run, ticks)
     assert list(rays(tmp_path / "run.rrd")) == expected
 
 
 def test_photocells_are_bars_as_long_as_what_they_see(tmp_path):
-    of, value = static(1), np.linspace(0.0, 1.0, 8)[None]
-    record(tmp_path / "run.rrd", of, [truth(of, readings=sensed([0], light_value=value))])
+    run, value = static(1), np.linspace(0.0, 1.0, 8)[None]
+    record(tmp_path / "run.rrd", run, [truth(run, readings=sensed([0], light_value=value))])
     lines, _ = rays(tmp_path / "run.rrd")[0]
     length_m = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
     np.testing.assert_allclose(length_m, 2.0 * EPUCK.radius_m * value[0], atol=1e-6)
 
 
 def test_agent_that_senses_nothing_has_no_rays(tmp_path):
-    of = static(2)
-    record(tmp_path / "run.rrd", of, [truth(of, tick) for tick in range(3)])
+    run = static(2)
+    record(tmp_path / "run.rrd", run, [truth(run, tick) for tick in range(3)])
     assert rays(tmp_path / "run.rrd") == {}
 
 
 def test_selected_robot_is_the_first_with_rays_unless_named():
     blind = replace(EPUCK, sensors={})
-    of = static(4)
-    mixed = replace(of, groups=(Group("a", blind, 0, 2), Group("b", EPUCK, 2, 4)))
+    run = static(4)
+    mixed = replace(run, groups=(Group("a", blind, 0, 2), Group("b", EPUCK, 2, 4)))
     assert selected_robot(mixed, None, "here") == "flock-2"
-    assert selected_robot(replace(of, groups=(Group("a", blind, 0, 4),)), None, "here") == "flock-0"
+    assert selected_robot(replace(run, groups=(Group("a", blind, 0, 4),)), None, "here") == "flock-0"
     assert selected_robot(mixed, "flock-1", "here") == "flock-1"
 
 
@@ -118,11 +118,11 @@ def test_selected_robot_that_does_not_exist_is_refused(tmp_path):
 
 
 def test_while_the_selected_robot_is_dead_the_next_one_alive_of_its_group_is_shown(tmp_path):
-    of = static(3)
+    run = static(3)
     pose = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
     lives = [[True, True, True], [True, False, True], [True, False, False], [False, False, False], [True, True, True]]
-    seen = [truth(of, tick, pose=pose, alive=np.array(alive)) for tick, alive in enumerate(lives)]
-    record(tmp_path / "run.rrd", of, seen, selected="flock-1")
+    truths = [truth(run, tick, pose=pose, alive=np.array(alive)) for tick, alive in enumerate(lives)]
+    record(tmp_path / "run.rrd", run, truths, selected="flock-1")
     moved = column(tmp_path / "run.rrd", "/world/selected", "Transform3D:translation")
     assert [row[0][0] for row in moved.values()] == [1.0, 2.0, 0.0, 1.0, 1.0]
     names = column(tmp_path / "run.rrd", "/world/selected/name", "Points2D:labels")

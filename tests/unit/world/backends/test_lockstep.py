@@ -146,7 +146,7 @@ def test_tick_split_among_runners_joins_to_the_undivided_tick(owners: list[int],
 
     out = lockstep.open_tick(2, expected_readings, received)
     assert [name for name, _ in out] == names
-    seen: dict[int, Any] = {}
+    tables: dict[int, Any] = {}
     packets: list[Any] = []
     answers: list[tuple[str, bytes]] = []
     for (name, frame), owned in zip(out, owned_rows, strict=True):
@@ -155,7 +155,7 @@ def test_tick_split_among_runners_joins_to_the_undivided_tick(owners: list[int],
         for part_name, part in got_readings.items():
             rows += part.rows.tolist()
             assert part.rows.tolist() == sorted(part.rows.tolist())
-            seen |= {
+            tables |= {
                 row: (part_name, [part.fields[f][at].tolist() for f in part.fields])
                 for at, row in enumerate(part.rows.tolist())
             }
@@ -172,7 +172,7 @@ def test_tick_split_among_runners_joins_to_the_undivided_tick(owners: list[int],
         for name, part in expected_readings.items()
         for at, row in enumerate(part.rows.tolist())
     }
-    assert seen == expected
+    assert tables == expected
     for name, answer in data.draw(st.permutations(answers)):
         lockstep.answer(name, answer)
     assert not lockstep.waiting

@@ -104,9 +104,9 @@ def test_torus_has_no_followed_robots(tmp_path: Path) -> None:
 
 
 def test_live_robot_stands_where_it_was_placed_until_its_first_pose() -> None:
-    place = {"how": "poses", "poses": [[0.0, 1.0, 0.5], [2.0, 1.0, 0.0]]}
+    placement = {"how": "poses", "poses": [[0.0, 1.0, 0.5], [2.0, 1.0, 0.0]]}
     table = mapping({"source": "udp"})
-    table["robots"]["led"]["place"] = place
+    table["robots"]["led"]["place"] = placement
     world = world_of(table)
     world.move(STILL)
     assert world.pose[:, :2].tolist() == [[0.0, 1.0], [2.0, 1.0]]

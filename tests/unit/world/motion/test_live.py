@@ -23,7 +23,7 @@ from tests.support.world.poses import GivenPoses
 NAN = float("nan")
 
 
-def given(clock: FakeClock, **settings: float) -> GivenPoses:
+def live_poses(clock: FakeClock, **settings: float) -> GivenPoses:
     motion = UdpMotion(source="udp").model_copy(update=settings)
     return GivenPoses(motion, ["a-0", "a-1"], [4, 5], (10.0, 5.0), clock)
 
@@ -38,7 +38,7 @@ def poses(source: LiveSource) -> dict[int, dict[int, float]]:
 
 
 def test_pose_is_given_once_to_the_row_of_its_robot() -> None:
-    source = given(FakeClock())
+    source = live_poses(FakeClock())
     source.put("a-1", 1.0, 2.0, 3.0, 0.5)
     assert poses(source) == {5: {0: 1.0, 1: 2.0, 2: 3.0, 3: 0.5}}
     assert poses(source) == {}
@@ -46,7 +46,7 @@ def test_pose_is_given_once_to_the_row_of_its_robot() -> None:
 
 
 def test_pose_without_height_and_heading_keeps_those_before() -> None:
-    source = given(FakeClock())
+    source = live_poses(FakeClock())
     source.put("a-0", 1.0, 2.0, NAN, NAN)
     assert poses(source) == {4: {0: 1.0, 1: 2.0}}
     source.put("a-0", 1.0, 2.0, 3.0, 0.5)
@@ -68,14 +68,14 @@ def test_pose_without_height_and_heading_keeps_those_before() -> None:
 def test_pose_that_cannot_be_used_is_counted_and_changes_nothing(
     pose: tuple[str, float, float, float, float], count: str
 ) -> None:
-    source = given(FakeClock())
+    source = live_poses(FakeClock())
     source.put(*pose)
     assert (poses(source), source.counts()) == ({}, {count: 1})
 
 
 def test_jump_is_ignored_until_its_speed_would_be_allowed() -> None:
     clock = FakeClock()
-    source = given(clock, max_speed_mps=2.0, max_age_s=100.0)
+    source = live_poses(clock, max_speed_mps=2.0, max_age_s=100.0)
     source.put("a-0", 0.0, 0.0, 0.0, 0.0)
     clock.time_ns += NS_PER_S
     source.put("a-0", 6.0, 0.0, 0.0, 0.0)
@@ -88,7 +88,7 @@ def test_jump_is_ignored_until_its_speed_would_be_allowed() -> None:
 
 
 def test_poses_that_arrive_together_may_have_been_sent_a_tenth_of_a_second_apart() -> None:
-    source = given(FakeClock(), max_speed_mps=20.0)
+    source = live_poses(FakeClock(), max_speed_mps=20.0)
     source.put("a-0", 0.0, 0.0, 0.0, 0.0)
     source.put("a-0", 2.0, 0.0, 0.0, 0.0)  # 20 m/s over 0.1 s
     assert poses(source)[4][0] == 2.0
@@ -98,7 +98,7 @@ def test_poses_that_arrive_together_may_have_been_sent_a_tenth_of_a_second_apart
 
 def test_jump_counts_also_in_height() -> None:
     clock = FakeClock()
-    source = given(clock, max_speed_mps=2.0, max_age_s=100.0)
+    source = live_poses(clock, max_speed_mps=2.0, max_age_s=100.0)
     source.put("a-0", 0.0, 0.0, 1.0, 0.0)
     clock.time_ns += NS_PER_S
     source.put("a-0", 0.0, 0.0, 9.0, 0.0)
@@ -108,7 +108,7 @@ def test_jump_counts_also_in_height() -> None:
 
 def test_stamps_order_poses_and_time_jumps_in_place_of_their_arrival() -> None:
     clock = FakeClock()
-    source = given(clock, max_speed_mps=2.0, stamps=True, max_age_s=100.0)
+    source = live_poses(clock, max_speed_mps=2.0, stamps=True, max_age_s=100.0)
     source.put("a-0", 0.0, 0.0, 0.0, 0.0, 5 * NS_PER_S)
     source.put("a-0", 3.0, 0.0, 0.0, 0.0, 7 * NS_PER_S)  # 1.5 m/s by the stamps; both arrive at once
     source.put("a-0", 1.0, 0.0, 0.0, 0.0, 6 * NS_PER_S)
@@ -121,7 +121,7 @@ def test_stamps_order_poses_and_time_jumps_in_place_of_their_arrival() -> None:
 
 def test_pose_that_was_wrong_is_replaced_once_the_robot_was_silent() -> None:
     clock = FakeClock()
-    source = given(clock, max_speed_mps=2.0, stamps=True, max_age_s=1.0)
+    source = live_poses(clock, max_speed_mps=2.0, stamps=True, max_age_s=1.0)
     source.put("a-0", 9.0, 0.0, 0.0, 0.0, 900 * NS_PER_S)  # of the future, and far away
     clock.time_ns += NS_PER_S
     source.put("a-0", 0.0, 0.0, 0.0, 0.0, NS_PER_S)
@@ -134,7 +134,7 @@ def test_pose_that_was_wrong_is_replaced_once_the_robot_was_silent() -> None:
 
 def test_pose_that_arrived_by_the_time_is_given_though_a_newer_one_waits() -> None:
     clock = FakeClock()
-    source = given(clock)
+    source = live_poses(clock)
     arrivals_ns = [clock.time_ns + k * 1_000_000 for k in range(4)]
     for k, at_ns in enumerate(arrivals_ns):
         clock.time_ns = at_ns
@@ -175,7 +175,7 @@ def test_stamp_of_a_datagram_is_its_t_s() -> None:
 
 def test_age_beyond_the_limit_counts_ticks_and_shows_in_the_report() -> None:
     clock = FakeClock()
-    source = given(clock, max_age_s=1.0)
+    source = live_poses(clock, max_age_s=1.0)
     source.put("a-0", 0.0, 0.0, 0.0, 0.0)
     source.put("a-1", 0.0, 0.0, 0.0, 0.0)
     for _ in range(4):
@@ -207,7 +207,7 @@ class StandingAgents:
 
 def test_first_poses_are_waited_for_and_those_of_tick_0() -> None:
     clock = FakeClock()
-    source, lines = given(clock), list[str]()
+    source, lines = live_poses(clock), list[str]()
     source.put("a-0", 1.0, 0.0, 0.0, 0.0)
 
     class PuttingClock(FakeClock):
@@ -229,7 +229,7 @@ def test_first_poses_are_waited_for_and_those_of_tick_0() -> None:
 
 def test_newest_poses_are_used_at_the_end_of_a_tick_by_a_loop_that_lags() -> None:
     clock = FakeClock()
-    source, pace = given(clock), Pace(clock, 10, 1.0, lambda _: None)
+    source, pace = live_poses(clock), Pace(clock, 10, 1.0, lambda _: None)
 
     class Lagging(StandingAgents):
         def act_in_time(self, tick: int, *inputs: Any) -> Actions:
@@ -249,13 +249,13 @@ def test_newest_poses_are_used_at_the_end_of_a_tick_by_a_loop_that_lags() -> Non
 def test_source_without_any_pose_in_time_is_refused() -> None:
     clock = FakeClock()
     with pytest.raises(BadInput, match="a-1"):
-        wait_for_poses([given(clock, wait_s=2.0)], clock, lambda _: None, lambda: False)
+        wait_for_poses([live_poses(clock, wait_s=2.0)], clock, lambda _: None, lambda: False)
     assert clock.time_ns == pytest.approx(2.0 * NS_PER_S, rel=0.05)
 
 
 def test_robot_without_a_pose_in_time_is_named_and_counts_as_silent() -> None:
     clock, lines = FakeClock(), list[str]()
-    source = given(clock, wait_s=2.0, max_age_s=3.0)
+    source = live_poses(clock, wait_s=2.0, max_age_s=3.0)
     source.put("a-0", 1.0, 0.0, 0.0, 0.0)
     wait_for_poses([source], clock, lines.append, lambda: False)
     assert "a-1" in lines[-1]
@@ -267,7 +267,7 @@ def test_robot_without_a_pose_in_time_is_named_and_counts_as_silent() -> None:
 
 def test_first_poses_are_not_waited_for_as_the_run_ends() -> None:
     clock, lines = StillClock(), list[str]()  # a clock that refuses to sleep
-    wait_for_poses([given(clock)], clock, lines.append, lambda: True)
+    wait_for_poses([live_poses(clock)], clock, lines.append, lambda: True)
     assert lines == []
 
 

@@ -53,14 +53,14 @@ def test_run_folder_gives_recorded_heights(tmp_path: Path) -> None:
 
 def test_run_folder_of_a_killed_run_is_read_from_its_parts(tmp_path: Path) -> None:
     folder = recorded(tmp_path / "run")
-    whole, ticks = read_trace(folder), pl.read_parquet(folder / "ticks.parquet")
+    unbroken, ticks = read_trace(folder), pl.read_parquet(folder / "ticks.parquet")
     (folder / "ticks.parquet").unlink()
     (folder / "ticks").mkdir()
     for part in (0, 1):
         ticks[4 * part : 4 * part + 4].write_parquet(folder / "ticks" / f"part-00000{part}.parquet")
     assert [file.name for file in files_of(folder)] == ["static.json", "part-000000.parquet", "part-000001.parquet"]
     trace = read_trace(folder)
-    assert (trace.t_s.tolist(), trace.x_m.tolist()) == (whole.t_s.tolist(), whole.x_m.tolist())
+    assert (trace.t_s.tolist(), trace.x_m.tolist()) == (unbroken.t_s.tolist(), unbroken.x_m.tolist())
 
 
 def test_folder_that_is_no_intact_run_is_refused(tmp_path: Path) -> None:

@@ -109,8 +109,8 @@ def test_proximity_to_a_wall_follows_the_curve_of_the_body(
     body: Body, off_deg: float, error: float, answers: dict[float, float]
 ) -> None:
     for distance_m, value in answers.items():
-        seen = values(scene([[5.0 - body.radius_m - distance_m, 0.0, np.deg2rad(off_deg)]], body), body)[0, 0]
-        assert seen == pytest.approx(value, abs=error)
+        reading = values(scene([[5.0 - body.radius_m - distance_m, 0.0, np.deg2rad(off_deg)]], body), body)[0, 0]
+        assert reading == pytest.approx(value, abs=error)
 
 
 @pytest.mark.parametrize("body", [EPUCK, FOOTBOT])
@@ -119,10 +119,10 @@ def test_proximity_kernel_equals_the_curve_of_the_sheet(body: Body) -> None:
     poses = np.random.default_rng(1).uniform(-1, 1, (100, 3)) * [0.6, 0.6, np.pi]
     looked_at = scene(poses, body, size_m=1.4)
     distance_m, value = proximity(looked_at, body).distance_m()[0], values(looked_at, body)
-    seen = np.isfinite(distance_m)
-    assert 100 < np.count_nonzero(seen) < seen.size
-    assert np.array_equal(value[seen], body.proximity.response.value(distance_m[seen]))
-    assert not value[~seen].any()
+    detected = np.isfinite(distance_m)
+    assert 100 < np.count_nonzero(detected) < detected.size
+    assert np.array_equal(value[detected], body.proximity.response.value(distance_m[detected]))
+    assert not value[~detected].any()
 
 
 # Of each sensor: a spec with noise, its distribution, and its sizes by field, absolute and as a share of the value.
@@ -155,7 +155,7 @@ def test_noise_of_a_sensor_is_keyed_and_clipped_to_its_range(name: str) -> None:
     exact_spec = replace(spec, **dict.fromkeys((key for key in asdict(spec) if key.startswith("noise")), 0.0))
     poses = np.random.default_rng(1).uniform(-1, 1, (20, 3)) * [0.3, 0.3, np.pi]
     looked_at = scene(poses, FOOTBOT, size_m=4.0, lights=(Light(1.0, 0.0, 2.0),), colour=0x00FF00)
-    exact, noisy, later = (read(looked_at, FOOTBOT, name, *of) for of in ((exact_spec, 4), (spec, 4), (spec, 5)))
+    exact, noisy, later = (read(looked_at, FOOTBOT, name, *case) for case in ((exact_spec, 4), (spec, 4), (spec, 5)))
     for field, (size, relative) in sizes.items():
         column = f"{name}.{field}"
         width = exact[column].shape[1:]

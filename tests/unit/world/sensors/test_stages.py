@@ -128,17 +128,17 @@ def read_ticks(pipeline: SensorPipeline, ticks: int, every: int = 1) -> dict[int
 def test_readings_follow_the_rate_and_the_delay(keys: Any, shown: list[int | None]) -> None:
     read = read_ticks(counter_sensor(**keys), 10)
     fresh, aging = read_ticks(counter_sensor(), 10), counter_sensor(**keys)
-    for tick, taken in enumerate(shown):
+    for tick, sampled in enumerate(shown):
         aging.read(tick)
-        assert aging.age(tick) == (None if taken is None else tick - taken)
+        assert aging.age(tick) == (None if sampled is None else tick - sampled)
         assert read[tick]["counter.tick"].shape == (6,)
         assert read[tick]["counter.seen"].shape == (6, 2)
-        if taken is None:
+        if sampled is None:
             assert np.isnan(read[tick]["counter.tick"]).all()
             assert (read[tick]["counter.seen"] == -1.0).all()
         else:
             for name in ("counter.tick", "counter.seen"):
-                assert np.array_equal(read[tick][name], fresh[taken][name])
+                assert np.array_equal(read[tick][name], fresh[sampled][name])
 
 
 @pytest.mark.parametrize("keys", [{}, {"rate_hz": 1.0}])
