@@ -281,11 +281,11 @@ arena = {{ size_m = [4.0, 4.0] }}
 run = {{ on_runner_loss = "stand", runner_timeout_s = 4.0 }}
 """
     file.write_text("\n".join([head, *groups]))
-    seen = Commands()
-    result = run(file, runners="per-robot", realtime=pace, observers=[seen])
+    commands = Commands()
+    result = run(file, runners="per-robot", realtime=pace, observers=[commands])
     lost = {loss.partition(", which played ")[2].partition(":")[0]: loss for loss in result.lost_runners}
     expected = {f"robot{at}-0": reason for at, reason in enumerate(faults.values()) if reason}
     assert set(lost) == set(expected)
     for robot, reason in expected.items():
         assert reason in lost[robot]
-    assert seen.last[:, 0].tolist() == [0.0 if reason else 0.1 for reason in faults.values()]
+    assert commands.last[:, 0].tolist() == [0.0 if reason else 0.1 for reason in faults.values()]

@@ -61,7 +61,7 @@ class HostileRun(NamedTuple):
     """A run with hostile agents."""
 
     result: Result
-    seen: Seen
+    observations: Seen
     lost: dict[str, str]  # reasons by robot
     began_s: float  # UTC since 1970
 
@@ -91,14 +91,14 @@ radio = {{ preset = "unit-disk" }}
 """
     file = folder / "borders.toml"
     file.write_text("\n".join([head, group("honest", "Honest"), group("prey", "Honest"), *hostile_groups]))
-    seen = Seen()
-    simulation = Simulation(file, runners="per-robot", out=folder / "run", observers=[seen], **options)
+    observations = Seen()
+    simulation = Simulation(file, runners="per-robot", out=folder / "run", observers=[observations], **options)
     simulation.watch(Announcement(folder / "run"))
     result = run_to_end(simulation)
     lost = dict(text.partition(", which played ")[2].split(": ", 1) for text in result.lost_runners)
     by_attack = {attack: lost.pop(f"h{at}-0") for at, attack in enumerate(attacks) if f"h{at}-0" in lost}
     assert not lost
-    return HostileRun(result, seen, by_attack, file.stat().st_mtime)
+    return HostileRun(result, observations, by_attack, file.stat().st_mtime)
 
 
 @pytest.fixture(scope="module")
@@ -116,9 +116,9 @@ def test_hostile_answer_loses_its_own_process_with_the_cause(attacked: HostileRu
 
 def test_hostile_answers_change_no_other_robot(attacked: HostileRun) -> None:
     assert attacked.result.ended == "duration"
-    assert attacked.seen.stood == set()
-    assert not attacked.seen.states & {"forged"}
-    assert attacked.seen.alive[:3] == [True] * 3
+    assert attacked.observations.stood == set()
+    assert not attacked.observations.states & {"forged"}
+    assert attacked.observations.alive[:3] == [True] * 3
     assert "honest-0" not in str(attacked.result.lost_runners)
     radio = attacked.result.radio
     assert radio is not None
@@ -175,15 +175,15 @@ def test_isolation_level_stops_the_listed_attacks(tmp_path: Path, surroundings: 
     if level == "isolate" and isolation_test("--isolate").returncode:
         pytest.skip("needs rights to make namespaces")
     done = hostile_run(tmp_path, [*hostile.OUTSIDE], {**surroundings, "run": str(tmp_path / "run")}, **LEVELS[level])
-    outcomes = dict(state.split(": ") for state in done.seen.states)
+    outcomes = dict(state.split(": ") for state in done.observations.states)
     opened = OPEN[level] | (
         {"signals to others"} if level != "isolate" and "signals" in isolation_test().stdout else set()
     )
     expected = {attack: "done" if attack in opened else "refused" for attack in hostile.OUTSIDE}
     assert outcomes == expected
     assert done.lost == {}
-    assert done.seen.alive[2] == (level != "agent network")  # the prey of "control"
-    assert done.seen.stood == set()
+    assert done.observations.alive[2] == (level != "agent network")  # the prey of "control"
+    assert done.observations.stood == set()
 
 
 def test_system_without_namespaces_refuses_isolation_but_has_no_network() -> None:

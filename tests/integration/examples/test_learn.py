@@ -34,8 +34,8 @@ def test_trained_network_acts_the_same_in_onnxruntime_as_in_torch(task: str, tmp
 
     actor, layout = train(TASKS[task], [0.0, 0.9], seed=1, updates=1)
     numbers = len(layout.observation)
-    seen = np.sin(np.arange(1000 * numbers) * 0.7).reshape(1000, numbers).astype(np.float32)
+    observations = np.sin(np.arange(1000 * numbers) * 0.7).reshape(1000, numbers).astype(np.float32)
     with torch.no_grad():
-        expected = actor(torch.from_numpy(seen)).numpy()
-    found = PolicyNetwork(exported(actor, numbers), "here")(seen)
-    assert np.abs(found - expected).max() < 1e-5
+        expected = actor(torch.from_numpy(observations)).numpy()
+    actions = PolicyNetwork(exported(actor, numbers), "here")(observations)
+    assert np.abs(actions - expected).max() < 1e-5

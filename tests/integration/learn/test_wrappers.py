@@ -38,10 +38,10 @@ def test_supersuit_copies_run_the_episodes_of_the_original(processes: int) -> No
     for rows in copies.reset()[0].reshape(2, ROBOTS, -1):
         np.testing.assert_array_equal(rows, [*begun.values()])
     for step in range(1, STEPS + 1):
-        seen, rewards, _, truncated, _ = copies.step(actions.reshape(2 * ROBOTS, 4))
+        observations, rewards, _, truncated, _ = copies.step(actions.reshape(2 * ROBOTS, 4))
         expected, reward, *_ = env.step(dict(zip(env.agents, actions[0], strict=True)))
         expected = env.reset()[0] if step == STEPS else expected  # it begins the next episode by itself
-        for rows in seen.reshape(2, ROBOTS, -1):
+        for rows in observations.reshape(2, ROBOTS, -1):
             np.testing.assert_array_equal(rows, [*expected.values()])
         np.testing.assert_array_equal(rewards.reshape(2, ROBOTS), np.float32([[*reward.values()]] * 2))
         assert np.all(truncated) == (step == STEPS)

@@ -70,12 +70,12 @@ def test_heading_is_counter_clockwise_from_the_arenas_x(connected: Rig, heading_
 
 @THAT_ROLL
 @ON_ONE_RIG
-@given(gone=st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), min_size=1, max_size=20))
-def test_odometry_adds_up_over_any_distance(connected: Rig, gone: list[tuple[float, float]]) -> None:
+@given(distances=st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)), min_size=1, max_size=20))
+def test_odometry_adds_up_over_any_distance(connected: Rig, distances: list[tuple[float, float]]) -> None:
     left_m, right_m = (
         float(connected.driver.sense(frozenset({"odometry"}))[f"odometry.{side}_m"][0]) for side in ("left", "right")
     )
-    for left, right in gone:
+    for left, right in distances:
         left_m, right_m = left_m + left * connected.farthest_m, right_m + right * connected.farthest_m
         connected.come_back({"odometry.left_m": np.array([left_m]), "odometry.right_m": np.array([right_m])})
 

@@ -140,15 +140,15 @@ def read(scenario: str, phase: str) -> dict[str, list[Any]]:
 @SCENARIOS
 def test_messages_are_equal_bytes_in_both_libraries(scenario):
     dds, bags = of_cyclonedds().BY_KIND, of_rosbags()
-    seen = defaultdict[str, int](int)
+    counts = defaultdict[str, int](int)
     for phase in recorded(scenario)[0].values():
         for topic, payloads in phase.items():
             kind = kind_of(topic)
             for payload in payloads:
                 assert dds[kind].deserialize(payload).serialize() == payload
                 assert bytes(bags.serialize_cdr(bags.deserialize_cdr(payload, kind), kind)) == payload
-                seen[kind] += 1
-    assert seen.keys() == {KINDS[topic] for topic in TOPICS[scenario]}
+                counts[kind] += 1
+    assert counts.keys() == {KINDS[topic] for topic in TOPICS[scenario]}
 
 
 def yaw(message: Any) -> float:
@@ -226,8 +226,8 @@ def test_distances_in_messages_are_those_of_the_walls(scenario):
     true_m = [to_wall_m(poses["rest"], angle) - body.radius_m for angle in np.radians(proximity.angles_deg)]
     assert {message.range != inf for message in near} == {True, False}
     assert all(message.min_range <= message.range <= message.max_range for message in near if message.range != inf)
-    seen = [message.range != inf for message in near]
-    assert all(true < message.max_range for message, true, is_seen in zip(near, true_m, seen, strict=True) if is_seen)
+    hits = [message.range != inf for message in near]
+    assert all(true < message.max_range for message, true, is_seen in zip(near, true_m, hits, strict=True) if is_seen)
     assert farthest_off(zip((message.range for message in near), true_m, strict=True)) < 0.05
 
 

@@ -103,9 +103,9 @@ def test_runner_that_sends_half_an_answer_is_lost(honest: tuple[Result, Played])
 
 def test_pranks_in_real_time_are_counted_and_delay_nothing() -> None:
     """The world does not wait: on a busy machine the runner gets fewer turns."""
-    left = list(BESIDE)
-    result = Played(lambda turn: left.pop(0).says(turn) if left else [turn.honest], 10 * TICKS).run(realtime=50.0)
-    expected = sum((Counter(prank.counts) for prank in BESIDE[: len(BESIDE) - len(left)]), Counter[str]())
+    pranks = list(BESIDE)
+    result = Played(lambda turn: pranks.pop(0).says(turn) if pranks else [turn.honest], 10 * TICKS).run(realtime=50.0)
+    expected = sum((Counter(prank.counts) for prank in BESIDE[: len(BESIDE) - len(pranks)]), Counter[str]())
     counted = Counter({name: result.counts.get(name, 0) for name in expected})
     assert (result.ended, result.ticks) == ("duration", 10 * TICKS)
     assert counted["wrong_tick_frames"] > 0

@@ -42,11 +42,11 @@ def stamped(x_m: float) -> independent.PoseStamped:
 
 def transforms(*frames: tuple[str, str, float]) -> independent.TFMessage:
     """Transforms of frames in their parents: parent, frame and x."""
-    found: list[independent.TransformStamped] = []
+    messages: list[independent.TransformStamped] = []
     for parent, frame, x_m in frames:
         transform = independent.Transform(independent.Vector3(x_m, 2.0, 3.0), pose(0.0).orientation)
-        found.append(independent.TransformStamped(independent.header(5, parent), frame, transform))
-    return independent.TFMessage(found)
+        messages.append(independent.TransformStamped(independent.header(5, parent), frame, transform))
+    return independent.TFMessage(messages)
 
 
 def source_of(**settings: Any) -> Ros2Source:
@@ -192,9 +192,9 @@ def test_source_is_a_subscriber_in_the_graph_of_ros():
             return sorted(str(reply.ok.key_expr).split("/", 5)[5] for reply in replies if reply.ok)
 
         until(lambda: len(tokens()) == 3)
-        found = tokens()
+        entities = tokens()
     kind = f"nav_msgs::msg::dds_::Odometry_/{rihs01(independent.Odometry)}/::,10:,:,:,,"
-    assert found == [
+    assert entities == [
         f"MS/%/%/swarmwire_poses/%flock_0%odom/{kind}",
         f"MS/%/%/swarmwire_poses/%flock_1%odom/{kind}",
         "NN/%/%/swarmwire_poses",

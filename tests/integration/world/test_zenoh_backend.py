@@ -343,11 +343,11 @@ def test_runner_that_is_not_ready_in_time_loses_its_robots(endpoint: str) -> Non
             session_info = idler.get(keys.session_info("idler"))
             joined = idler.get(keys.join("idler"), payload=JoinRequest(names=("flock-1",)).encode())
             until(lambda: (backend._handle_arrived(), changes)[1])
-            (told,), (assigned,) = session_info, joined
+            (info,), (assigned,) = session_info, joined
     assert endpoints == [(endpoint,)]
     assert assigned.ok is not None
-    assert told.ok is not None
-    assert SessionInfo.decode(told.ok.payload.to_bytes()).groups[0].robots == 3
+    assert info.ok is not None
+    assert SessionInfo.decode(info.ok.payload.to_bytes()).groups[0].robots == 3
     reason = "its agents were not ready within 0.2 s"
     assert changes == [RunnerEvent("lost", "idler", ("flock-1",), -1, reason)]
     assert free == [{"flock-0", "flock-1", "flock-2"}]

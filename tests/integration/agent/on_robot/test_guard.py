@@ -165,8 +165,8 @@ def test_agent_that_closed_needs_no_stop(tmp_path, code):
 
 def test_exit_without_a_closed_message_is_a_death(tmp_path, capfd):
     assert guarded(tmp_path, f"tell({RUNS!r}); sys.exit(0)") == (FAILED, "stopped")
-    told = "guard: the agent is gone: its process ended (exit code 0); the motors were stopped\n"
-    assert capfd.readouterr().err == told
+    report = "guard: the agent is gone: its process ended (exit code 0); the motors were stopped\n"
+    assert capfd.readouterr().err == report
 
 
 def test_agent_without_heartbeats_is_ended(tmp_path, capfd):

@@ -33,22 +33,22 @@ def color_at(figure: FilmFigure, image: np.ndarray, x_m: float, y_m: float) -> t
     return tuple(int(value) for value in image[int(len(image) - up), int(column)][:3])
 
 
-def shown(of: Film, index: int, *places_m) -> list[tuple[int, ...]]:
-    figure = FilmFigure(of, SIZE_PX)
+def shown(run: Film, index: int, *places_m) -> list[tuple[int, ...]]:
+    figure = FilmFigure(run, SIZE_PX)
     image = figure.frame(index)
     return [color_at(figure, image, *place_m) for place_m in places_m]
 
 
-def legend_of(of: Film) -> list[str]:
-    return [text.get_text() for text in FilmFigure(of, SIZE_PX)._figure.legends[0].get_texts()]
+def legend_of(run: Film) -> list[str]:
+    return [text.get_text() for text in FilmFigure(run, SIZE_PX)._figure.legends[0].get_texts()]
 
 
 def facts_of_scenario(static: Static) -> list[tuple[str, str]]:
     return _facts(static, 1.0, 1.0)
 
 
-def robots_shown(of: Film, index: int) -> list[tuple[int, ...]]:
-    return shown(of, index, *of.pose[index, :, :2])
+def robots_shown(run: Film, index: int) -> list[tuple[int, ...]]:
+    return shown(run, index, *run.pose[index, :, :2])
 
 
 @pytest.mark.parametrize("index", [0, 30])
@@ -57,20 +57,20 @@ def test_robots_have_the_colour_of_their_group_where_they_are(index):
 
 
 def test_frame_shows_only_its_own_tick():
-    of = film(ticks=61)
-    figure = FilmFigure(of, SIZE_PX)
+    run = film(ticks=61)
+    figure = FilmFigure(run, SIZE_PX)
     figure.frame(0)
     image = figure.frame(60)
-    assert color_at(figure, image, *of.pose[0, 2, :2]) == FLOOR
-    np.testing.assert_array_equal(image, FilmFigure(of, SIZE_PX).frame(60))
+    assert color_at(figure, image, *run.pose[0, 2, :2]) == FLOOR
+    np.testing.assert_array_equal(image, FilmFigure(run, SIZE_PX).frame(60))
 
 
 def test_dead_robots_are_grey_and_crossed_out_from_the_tick_in_which_they_die():
     alive = np.ones((31, 3), np.bool_)
     alive[15:, 1] = False
-    of = film(alive=alive)
-    assert robots_shown(of, 14)[1] == robot_color(0)
-    first, cross, last = robots_shown(of, 15)
+    run = film(alive=alive)
+    assert robots_shown(run, 14)[1] == robot_color(0)
+    first, cross, last = robots_shown(run, 15)
     assert (first, last) == (robot_color(0), robot_color(1))
     assert cross == tuple(round(255 * part) for part in shade(DEAD))
 
@@ -78,9 +78,9 @@ def test_dead_robots_are_grey_and_crossed_out_from_the_tick_in_which_they_die():
 def test_states_colour_the_robots_that_are_in_them():
     state = np.full((31, 3), NO_STATE)
     state[:, 1], state[10:, 2] = 1, 0
-    of = film(state=state, state_names=("search", "rest"))
-    assert robots_shown(of, 0) == [OTHER_STATE, STATE_COLORS[1], OTHER_STATE]
-    assert robots_shown(of, 10)[2] == STATE_COLORS[0]
+    run = film(state=state, state_names=("search", "rest"))
+    assert robots_shown(run, 0) == [OTHER_STATE, STATE_COLORS[1], OTHER_STATE]
+    assert robots_shown(run, 10)[2] == STATE_COLORS[0]
 
 
 def test_states_beyond_the_colours_share_one_and_the_frequent_have_their_own():
@@ -89,28 +89,28 @@ def test_states_beyond_the_colours_share_one_and_the_frequent_have_their_own():
     state[-1] = [0, 3, 4]
     state[state == 3] = 4
     state[-1, 1] = 3  # the rarest: seen once
-    of = film(state=state, state_names=names)
-    assert robots_shown(of, 30) == [STATE_COLORS[0], OTHER_STATE, STATE_COLORS[3]]
+    run = film(state=state, state_names=names)
+    assert robots_shown(run, 30) == [STATE_COLORS[0], OTHER_STATE, STATE_COLORS[3]]
 
 
 def test_obstacles_of_every_shape_and_lights_stand_where_they_are():
-    seen = shown(film(), 0, *((o.x_m, o.y_m) for o in OBSTACLES), (LIGHT.x_m, LIGHT.y_m), (2.5, 0.5))
-    assert seen == [OBSTACLE, OBSTACLE, OBSTACLE, (0xFF, 0xD2, 0x3F), FLOOR]
+    colors = shown(film(), 0, *((o.x_m, o.y_m) for o in OBSTACLES), (LIGHT.x_m, LIGHT.y_m), (2.5, 0.5))
+    assert colors == [OBSTACLE, OBSTACLE, OBSTACLE, (0xFF, 0xD2, 0x3F), FLOOR]
 
 
 def test_obstacles_that_robots_push_look_otherwise_than_fixed_ones_and_the_legend_tells():
     pillar, box, _ = OBSTACLES
     static = replace(two_groups(), obstacles=((pillar, replace(box, mass_kg=0.2)),))
     movable = np.broadcast_to([box.x_m, box.y_m, box.heading_rad], (31, 1, 3))
-    of = film(static=static, movable=movable)
-    assert shown(of, 0, (pillar.x_m, pillar.y_m), (box.x_m, box.y_m)) == [OBSTACLE, MOVABLE]
-    assert "movable" in legend_of(of)
+    run = film(static=static, movable=movable)
+    assert shown(run, 0, (pillar.x_m, pillar.y_m), (box.x_m, box.y_m)) == [OBSTACLE, MOVABLE]
+    assert "movable" in legend_of(run)
     assert "movable" not in legend_of(film())
     assert {"1 cylinder", "1 movable box"} <= {text for _, text in facts_of_scenario(static)}
 
 
 @pytest.mark.parametrize(
-    ("given", "joined"),
+    ("endpoints", "joined"),
     [
         ({}, True),
         ({"alive": np.tile([False, True, True], (31, 1))}, False),
@@ -119,16 +119,16 @@ def test_obstacles_that_robots_push_look_otherwise_than_fixed_ones_and_the_legen
         ({"static": replace(two_groups(), obstacles=((Obstacle("cylinder", -2.6, -1.0, radius_m=0.1),),))}, False),
     ],
 )
-def test_links_join_robots_alive_in_range_and_sight(given, joined):
+def test_links_join_robots_alive_in_range_and_sight(endpoints, joined):
     pixel_m = 0.02
     across = [(-2.25, -1.0 + up * pixel_m) for up in (-1, 0, 1)]  # half way between two robots
-    assert (shown(film(**given), 0, *across) != [FLOOR] * 3) == joined
+    assert (shown(film(**endpoints), 0, *across) != [FLOOR] * 3) == joined
 
 
 def test_trail_follows_a_robot_that_moved_and_fades():
-    of = film(ticks=101)
-    pose = of.pose[100, 0]
-    near, far, beyond = shown(of, 100, *((pose[0] - behind, pose[1]) for behind in (0.4, 2.0, 3.0)))
+    run = film(ticks=101)
+    pose = run.pose[100, 0]
+    near, far, beyond = shown(run, 100, *((pose[0] - behind, pose[1]) for behind in (0.4, 2.0, 3.0)))
     assert sum(near) < sum(far) < sum(FLOOR)
     assert beyond == FLOOR  # more than five seconds ago
 
@@ -138,9 +138,9 @@ def flying(altitude_m: float) -> Film:
     body = replace(load_body("footbot"), radius_m=0.4)
     groups = (Group("air", replace(body, altitude_m=altitude_m), 0, 1), Group("floor", body, 1, 3))
     static = replace(two_groups(), groups=groups, robot_names=("air-0", "floor-0", "floor-1"))
-    of = film(static=static)
-    of.pose[:, 1, :2] = of.pose[:, 0, :2] + (0.15, 0.15)
-    return of
+    run = film(static=static)
+    run.pose[:, 1, :2] = run.pose[:, 0, :2] + (0.15, 0.15)
+    return run
 
 
 def test_robots_that_fly_lie_above_those_on_the_floor():
@@ -187,11 +187,11 @@ def test_metrics_without_values_are_plotted_only_if_listed():
 
 def test_metrics_of_the_scenario_are_plotted_before_the_usual_ones():
     names = ["order", "min_gap", "link_pdr", "coverage", "spread"]
-    of = film(metrics=dict.fromkeys(names, np.linspace(0.0, 1.0, 31)))
+    run = film(metrics=dict.fromkeys(names, np.linspace(0.0, 1.0, 31)))
     facts = {
         name: MetricInfo(name, "", "", "level", (None, None)) for name in ("order", "min_gap", "coverage", "spread")
     }
-    axes = FilmFigure(replace(of, facts=facts), 300)._figure.axes[1:]
+    axes = FilmFigure(replace(run, facts=facts), 300)._figure.axes[1:]
     assert [plot.get_title(loc="left") for plot in axes] == ["coverage", "spread", "order"]
 
 
@@ -239,8 +239,8 @@ def test_obstacles_are_in_the_way_as_they_are_in_the_air(obstacle: Obstacle):
         for j in range(i + 1, 60)
         if not is_blocked_on_floor(index, 0, *position_m[i], *position_m[j])
     }
-    found = in_range(position_m, np.ones(60, np.bool_), 9.0, (obstacle,))
-    assert {(min(pair), max(pair)) for pair in found.tolist()} == expected
+    within_range = in_range(position_m, np.ones(60, np.bool_), 9.0, (obstacle,))
+    assert {(min(pair), max(pair)) for pair in within_range.tolist()} == expected
     assert 0 < len(expected) < 60 * 59 / 2
 
 
@@ -269,8 +269,8 @@ def test_gif_has_a_frame_per_tick_in_the_colours_of_the_picture(figure, tmp_path
     with Image.open(tmp_path / "a.gif") as gif:
         assert gif.n_frames == len(TICKS)
         assert gif.info["loop"] == 0
-        for place, tick in enumerate(TICKS):
-            gif.seek(place)
+        for index, tick in enumerate(TICKS):
+            gif.seek(index)
             assert gif.info["duration"] == 80
             shown = np.asarray(gif.convert("RGB"))
             assert off(shown[robot_at(figure, tick)], robot_color(1)) < NEAR
@@ -307,8 +307,8 @@ def test_twenty_robots_for_a_minute_make_a_small_gif(tmp_path):
     rng = np.random.default_rng(3)
     heading = rng.uniform(-3, 3, robots) + np.cumsum(rng.normal(0, 0.1, (ticks, robots)), axis=0)
     step = 0.05 * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    place = rng.uniform(-2, 2, (robots, 2)) + np.cumsum(step, axis=0)
-    pose = np.concatenate([place, heading[:, :, None]], axis=-1)
+    position_m = rng.uniform(-2, 2, (robots, 2)) + np.cumsum(step, axis=0)
+    pose = np.concatenate([position_m, heading[:, :, None]], axis=-1)
     alive, time_s = np.ones((ticks, robots), np.bool_), np.arange(ticks) / 10
     metrics = {"order": rng.uniform(size=ticks), "link_pdr": rng.uniform(size=ticks)}
     figure = FilmFigure(film(static=static, pose=pose, alive=alive, time_s=time_s, metrics=metrics), 480)

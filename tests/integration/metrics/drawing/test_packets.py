@@ -27,11 +27,11 @@ def folder(tmp_path_factory) -> RunFolder:
 
 def colors_on_the_way(fate: Fate, index: int) -> list[tuple[int, ...]]:
     """In a tick, at 0.3 and 0.6 of the way of the one packet between two robots in range, where no trail is."""
-    of = film()
-    first = (np.arange(len(of.time_s) + 1) > ENDED).astype(np.int64)
-    figure = FilmFigure(of, 640, packets=PacketEnds(first, np.array([0]), np.array([1]), np.array([fate])))
+    run = film()
+    first = (np.arange(len(run.time_s) + 1) > ENDED).astype(np.int64)
+    figure = FilmFigure(run, 640, packets=PacketEnds(first, np.array([0]), np.array([1]), np.array([fate])))
     image = figure.frame(index)
-    start_m, end_m = of.pose[index, :2, :2].astype(float)
+    start_m, end_m = run.pose[index, :2, :2].astype(float)
     places = figure._figure.axes[0].transData.transform([start_m + share * (end_m - start_m) for share in (0.3, 0.6)])
     return [tuple(image[int(len(image) - up), int(column)].tolist()) for column, up in places]
 
@@ -50,14 +50,14 @@ def test_packet_is_drawn_only_in_the_tick_of_its_end_and_replaces_links(index):
 
 
 def test_packets_in_a_film_are_as_many_per_tick_as_the_run_counted(folder):
-    of = film_of(folder, 0, "run")
-    packets = packets_of(folder, of)
+    run = film_of(folder, 0, "run")
+    packets = packets_of(folder, run)
     assert packets is not None
-    fates = [packets.ended_in(tick)[1] for tick in range(len(of.time_s))]
+    fates = [packets.ended_in(tick)[1] for tick in range(len(run.time_s))]
     counted = folder.ticks(0)["received"].to_list()
     assert [int((fate == Fate.RECEIVED).sum()) for fate in fates] == counted
     assert packets.fates == (Fate.RECEIVED, Fate.LOST, Fate.PARTITIONED)
-    parted_s = {of.time_s[tick] for tick, fate in enumerate(fates) if (fate == Fate.PARTITIONED).any()}
+    parted_s = {run.time_s[tick] for tick, fate in enumerate(fates) if (fate == Fate.PARTITIONED).any()}
     assert 1.0 < min(parted_s) <= max(parted_s) <= 1.7
 
 

@@ -119,22 +119,22 @@ STRENGTH = Band(*np.array([[-50.0, -70.0, -90.0]] * 3))
 def test_coverage_of_signals_has_a_map_of_strength_and_that_of_a_disk_of_reach(tmp_path, monkeypatch, signals):
     drawn = []
     monkeypatch.setattr(radio, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
-    found = SIGNALS if signals else replace(SIGNALS, mean_dbm=None)
+    result = SIGNALS if signals else replace(SIGNALS, mean_dbm=None)
     distances = ByDistance(DISTANCES, DELIVERY, STRENGTH if signals else None)
-    draw_coverage(static(3), found, distances, -90.0 if signals else None, "a radio", tmp_path / "coverage.png")
+    draw_coverage(static(3), result, distances, -90.0 if signals else None, "a radio", tmp_path / "coverage.png")
     [figure] = drawn
-    place, *others = figure.axes
+    map_axes, *others = figure.axes
     assert figure.texts[0].get_text() == "a radio"
-    assert (place.get_xlim(), place.get_ylim()) == ((-4.0, 4.0), (-3.0, 3.0))
-    np.testing.assert_array_equal(place.images[0].get_array().mask, ~NEAR)
+    assert (map_axes.get_xlim(), map_axes.get_ylim()) == ((-4.0, 4.0), (-3.0, 3.0))
+    np.testing.assert_array_equal(map_axes.images[0].get_array().mask, ~NEAR)
     curves = [axes.lines[0].get_ydata().tolist() for axes in others if axes.lines]
     assert curves == [DELIVERY.mean.tolist(), STRENGTH.mean.tolist()][: 1 + signals]
     assert (tmp_path / "coverage.png").stat().st_size > 1000
 
 
 def test_delivery_curve_of_the_table_ends_just_beyond_what_was_received(tmp_path, monkeypatch):
-    of, drawn = static(6, arenas=2), []
-    record(tmp_path, of, ticks(DISK, of, 3, count=20))
+    run, drawn = static(6, arenas=2), []
+    record(tmp_path, run, ticks(DISK, run, 3, count=20))
     monkeypatch.setattr(radio, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
     draw_distances(RunFolder(tmp_path), 1, tmp_path / "pdr.png", 640)
     [figure] = drawn
@@ -151,8 +151,8 @@ def test_delivery_curve_of_the_table_ends_just_beyond_what_was_received(tmp_path
 
 
 def test_distances_that_cannot_be_drawn_are_refused(tmp_path):
-    of = static(2)
-    record(tmp_path, of, [truth(of, departed=departed([]), finished=links([], [], 0, 0))])
+    run = static(2)
+    record(tmp_path, run, [truth(run, departed=departed([]), finished=links([], [], 0, 0))])
     for arena, option in enumerate(("--kind", "--arena")):
         with pytest.raises(BadInput, check=lambda error, option=option: error.where == option):
             draw_distances(RunFolder(tmp_path), arena, tmp_path / "pdr.png", 640)
@@ -171,8 +171,8 @@ def test_distances_that_cannot_be_drawn_are_refused(tmp_path):
     ],
 )
 def test_damaged_table_of_distances_is_refused_with_file_and_fault(tmp_path, change, fault):
-    of = static(6)
-    record(tmp_path, of, ticks(DISK, of, 3, count=20))
+    run = static(6)
+    record(tmp_path, run, ticks(DISK, run, 3, count=20))
     file = tmp_path / "radio_distances.parquet"
     table = pl.read_parquet(file)
     (table.drop("pdr") if change is None else table.with_columns(change)).write_parquet(file)

@@ -37,7 +37,7 @@ def folder(tmp_path):
     return as_logs(flock(), tmp_path / "logs")
 
 
-def told(folder, robot, **changes):
+def change_facts(folder, robot, **changes):
     """Change what a robot says of itself; None takes a key away."""
     path = folder / robot / "robot.json"
     says = {**json.loads(path.read_text()), **changes}
@@ -47,7 +47,7 @@ def told(folder, robot, **changes):
 def test_robots_come_in_the_order_of_their_index(folder):
     says = {"robots": [f"flock-{i}" for i in (3, 1, 0, 2, 5, 4)]}
     for robot in range(6):
-        told(folder, f"flock-{robot}", **says)
+        change_facts(folder, f"flock-{robot}", **says)
     logs = read_real_logs(folder)
     assert logs.names == tuple(says["robots"])
     assert (logs.rate_hz, logs.notes) == (10.0, ())
@@ -66,8 +66,8 @@ def test_logs_may_lie_one_deeper_and_of_each_robot_the_newest_start_counts(folde
         (folder / f"flock-{robot}").rename(own / "b-first")
         if robot < 2:
             shutil.copytree(own / "b-first", own / "a-second")
-            told(own, "a-second", started_utc_ns=2_000_000_000)
-        told(own, "b-first", started_utc_ns=1_000_000_000)
+            change_facts(own, "a-second", started_utc_ns=2_000_000_000)
+        change_facts(own, "b-first", started_utc_ns=1_000_000_000)
     logs = read_real_logs(tmp_path / "starts")
     assert logs.names == tuple(f"flock-{i}" for i in range(6))
     assert [robot.where.endswith("a-second") for robot in logs.robots] == [True, True, False, False, False, False]
@@ -76,7 +76,7 @@ def test_logs_may_lie_one_deeper_and_of_each_robot_the_newest_start_counts(folde
 
 
 def test_killed_robots_half_written_line_is_dropped_with_a_note(folder):
-    whole = read_real_logs(folder).robots[1]
+    complete = read_real_logs(folder).robots[1]
     (folder / "flock-1" / "summary.json").unlink()
     for name in ("ticks.csv", "received.csv"):
         path = folder / "flock-1" / name
@@ -84,8 +84,8 @@ def test_killed_robots_half_written_line_is_dropped_with_a_note(folder):
     logs = read_real_logs(folder)
     robot = logs.robots[1]
     assert robot.ended is None
-    assert len(robot.steps.time_s) == len(whole.steps.time_s) - 1
-    assert len(robot.received.time_s) == len(whole.received.time_s) - 1
+    assert len(robot.steps.time_s) == len(complete.steps.time_s) - 1
+    assert len(robot.received.time_s) == len(complete.received.time_s) - 1
     killed, dropped = logs.notes
     assert "summary of flock-1" in killed
     assert "flock-1's ticks.csv, received.csv" in dropped
@@ -98,7 +98,7 @@ def test_empty_logs_of_a_robot_killed_at_once_are_read(folder):
 
 
 def test_missing_robots_and_different_agents_are_told(folder):
-    told(folder, "flock-0", agent="other:Agent", params={"a": 1})
+    change_facts(folder, "flock-0", agent="other:Agent", params={"a": 1})
     (folder / "flock-3" / "robot.json").rename(folder / "robot.json.old")
     for name in ("ticks.csv", "received.csv", "sent.csv", "summary.json"):
         (folder / "flock-3" / name).unlink()
@@ -122,7 +122,7 @@ def test_missing_robots_and_different_agents_are_told(folder):
     ],
 )
 def test_robots_of_different_kinds_of_runs_are_refused_with_file_and_key(folder, changes, key, hint):
-    told(folder, "flock-1", **changes)
+    change_facts(folder, "flock-1", **changes)
     with pytest.raises(BadInput) as refused:
         read_real_logs(folder)
     assert refused.value.where == str(folder / "flock-1" / "robot.json")
@@ -161,7 +161,7 @@ def test_folder_without_a_real_log_is_refused(folder, tmp_path):
         BadInput, check=lambda error: (error.where, error.key) == (str(folder / "flock-1"), "robot.json")
     ):
         read_real_logs(folder)
-    told(folder, "flock-2")
+    change_facts(folder, "flock-2")
     (folder / "flock-1").rename(tmp_path / "away")
     for text in ("{", "[]"):
         (folder / "flock-2" / "robot.json").write_text(text)
@@ -198,56 +198,56 @@ def of_run():
 
 def measures(static, truths, metrics) -> np.ndarray:
     """The values of metrics, (ticks, metrics); NaN of one that cannot do with what it is given."""
-    of, values = Metrics(metrics), []
-    of.begin(static)
+    observer, values = Metrics(metrics), []
+    observer.begin(static)
     try:
         for truth in truths:
-            of.see(truth)
-            values.append(of.values[:, 0].copy())
+            observer.see(truth)
+            values.append(observer.values[:, 0].copy())
     except CustomCodeFailed:
         return np.full((1, len(metrics)), np.nan)
     return np.array(values)
 
 
-def measured(folder, place=True, **how):
-    return measured_log(read_real_logs(as_logs(flock(), folder, **how)), MEASURES, flock().static if place else None)
+def measured(folder, arena=True, **how):
+    return measured_log(read_real_logs(as_logs(flock(), folder, **how)), MEASURES, flock().static if arena else None)
 
 
 def test_logs_of_robots_in_step_measure_as_the_run_did(tmp_path, emulated):
     series, radio = emulated
-    of = measured(tmp_path)
-    assert of.notes == ()
+    log = measured(tmp_path)
+    assert log.notes == ()
     for name in ("order", "cohesion", "min_gap", "throughput", "age_of_information"):
-        np.testing.assert_allclose(of.series[name], series[name], rtol=1e-5, atol=1e-5, err_msg=name)
+        np.testing.assert_allclose(log.series[name], series[name], rtol=1e-5, atol=1e-5, err_msg=name)
     # Differences of positions are speeds between ticks, not at them.
-    assert np.nanmean(of.series["speed"]) == pytest.approx(np.nanmean(series["speed"]), rel=0.03)
-    assert of.radio["fates"]["received"] == radio["fates"]["received"]
-    assert of.radio["latency_air_s"] == radio["latency_air_s"]
+    assert np.nanmean(log.series["speed"]) == pytest.approx(np.nanmean(series["speed"]), rel=0.03)
+    assert log.radio["fates"]["received"] == radio["fates"]["received"]
+    assert log.radio["latency_air_s"] == radio["latency_air_s"]
 
 
 def test_robots_that_step_when_they_like_measure_within_the_error_of_interpolation(tmp_path, emulated):
     series, _ = emulated
-    of = measured(tmp_path, phase_s=PHASES_S)
-    assert of.static.robot_names == flock().static.robot_names
+    log = measured(tmp_path, phase_s=PHASES_S)
+    assert log.static.robot_names == flock().static.robot_names
     for name, within in (("order", 0.03), ("cohesion", 0.01), ("min_gap", 0.01)):
-        assert np.nanmean(np.abs(of.series[name] - series[name][: len(of.series[name])])) < within, name
+        assert np.nanmean(np.abs(log.series[name] - series[name][: len(log.series[name])])) < within, name
 
 
 def test_measures_that_a_log_cannot_know_are_left_out_and_never_0(tmp_path):
-    of = measured(tmp_path)
-    assert set(of.left_out) == {"collisions", "components", "airtime"}
-    assert not set(of.left_out) & set(of.series)
-    assert of.radio["intended"] == of.radio["in_range"] + of.radio["fates"]["in_flight"]
+    log = measured(tmp_path)
+    assert set(log.left_out) == {"collisions", "components", "airtime"}
+    assert not set(log.left_out) & set(log.series)
+    assert log.radio["intended"] == log.radio["in_range"] + log.radio["fates"]["in_flight"]
 
 
 @pytest.mark.parametrize("name", METRICS)
 def test_metric_of_a_log_is_that_of_the_run_or_left_out_for_missing_data(name, real, of_run):
     metric = METRICS[name]()
-    found = measures(real.static, real.truths(), [metric])
+    values = measures(real.static, real.truths(), [metric])
     if missing_data(metric, LOGGED) is not None:
-        assert np.isnan(found).all()
+        assert np.isnan(values).all()
     elif np.isfinite(of_run[name]).any():
-        assert np.nanmean(found) == pytest.approx(np.nanmean(of_run[name]), rel=0.05, abs=0.05)
+        assert np.nanmean(values) == pytest.approx(np.nanmean(of_run[name]), rel=0.05, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -256,45 +256,45 @@ def test_metric_of_a_log_is_that_of_the_run_or_left_out_for_missing_data(name, r
 def test_metric_measured_without_poses_does_not_depend_on_them(name, real):
     metric, unknown = METRICS[name](), np.full_like(real._motion.pose, np.nan)
     blind = replace(real, _motion=replace(real._motion, pose=unknown, velocity=unknown))
-    with_poses, without = (measures(real.static, of.truths(), [metric]) for of in (real, blind))
+    with_poses, without = (measures(real.static, log.truths(), [metric]) for log in (real, blind))
     np.testing.assert_array_equal(with_poses, without)
 
 
 def test_without_a_tracker_the_radio_is_measured_and_nothing_else(tmp_path):
-    of = measured(tmp_path, tracker=False)
-    assert set(of.series) == {"pdr", "link_pdr", "throughput", "age_of_information", "latency_air"}
-    assert "tracker" in of.left_out["order"]
-    assert [("tracker" in note) for note in of.notes] == [True]
-    assert of.radio["fates"]["received"] > 1000
+    log = measured(tmp_path, tracker=False)
+    assert set(log.series) == {"pdr", "link_pdr", "throughput", "age_of_information", "latency_air"}
+    assert "tracker" in log.left_out["order"]
+    assert [("tracker" in note) for note in log.notes] == [True]
+    assert log.radio["fates"]["received"] > 1000
 
 
 def test_clocks_that_are_apart_are_told_and_set_right(tmp_path, emulated):
     series, radio = emulated
-    of = measured(tmp_path, ahead_s={"flock-2": 0.3})
-    (note,) = of.notes
+    log = measured(tmp_path, ahead_s={"flock-2": 0.3})
+    (note,) = log.notes
     assert "flock-2 +0.3" in note
-    assert of.radio["latency_air_s"]["p50"] == pytest.approx(radio["latency_air_s"]["p50"], abs=0.003)
-    assert np.nanmean(np.abs(of.series["cohesion"] - series["cohesion"][: len(of.series["cohesion"])])) < 0.01
+    assert log.radio["latency_air_s"]["p50"] == pytest.approx(radio["latency_air_s"]["p50"], abs=0.003)
+    assert np.nanmean(np.abs(log.series["cohesion"] - series["cohesion"][: len(log.series["cohesion"])])) < 0.01
 
 
 def test_robot_without_a_log_is_missing_from_the_packet_counts(tmp_path, emulated):
     folder = as_logs(flock(), tmp_path)
     (folder / "flock-4").rename(tmp_path.parent / f"{tmp_path.name}-away")
-    of = measured_log(read_real_logs(folder), MEASURES)
-    assert ["flock-4" in note for note in of.notes] == [True]
-    assert of.static.robots == 5
-    assert of.radio["sent"] == pytest.approx(5 / 6 * emulated[1]["sent"], rel=0.02)
-    assert of.radio["intended"] == 4 * of.radio["sent"]
-    assert of.radio["pdr"] == pytest.approx(0.7, abs=0.1)
+    log = measured_log(read_real_logs(folder), MEASURES)
+    assert ["flock-4" in note for note in log.notes] == [True]
+    assert log.static.robots == 5
+    assert log.radio["sent"] == pytest.approx(5 / 6 * emulated[1]["sent"], rel=0.02)
+    assert log.radio["intended"] == 4 * log.radio["sent"]
+    assert log.radio["pdr"] == pytest.approx(0.7, abs=0.1)
 
 
 def test_robot_that_was_killed_ends_the_comparison_for_all(tmp_path):
     folder = as_logs(flock(), tmp_path)
     path = folder / "flock-3" / "ticks.csv"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:102]))
-    of = measured_log(read_real_logs(folder), MEASURES)
-    assert of.duration_s == 10.0
-    assert ["9.9 s" in note and "flock-3" in note for note in of.notes] == [True]
+    log = measured_log(read_real_logs(folder), MEASURES)
+    assert log.duration_s == 10.0
+    assert ["9.9 s" in note and "flock-3" in note for note in log.notes] == [True]
 
 
 def test_robots_that_never_ran_together_are_refused(tmp_path):
@@ -314,6 +314,6 @@ def test_logs_that_last_for_years_are_refused_as_a_clock_was_set(tmp_path):
 
 
 def test_nobody_tells_the_arena_and_it_holds_the_robots(tmp_path):
-    of = measured(tmp_path, place=False)
-    assert of.static.boundary == "open"
-    assert min(of.static.arena_size_m) > 2.0
+    log = measured(tmp_path, arena=False)
+    assert log.static.boundary == "open"
+    assert min(log.static.arena_size_m) > 2.0

@@ -51,7 +51,7 @@ document.getElementById("phone").onload = (event) => {{
 </script>"""
 
 
-def of(folder, responses=()):
+def report_of(folder, responses=()):
     """The report's sections by title, and its page."""
     report = campaign_report(CampaignFolder(folder), responses)
     return {section.title: section for section in report.sections}, Page(page(report))
@@ -62,7 +62,7 @@ def ordinary(tmp_path, **differently):
 
 
 def test_report_of_one_parameter_has_curves_and_no_map(tmp_path):
-    sections, shown = of(ordinary(tmp_path))
+    sections, shown = report_of(ordinary(tmp_path))
     assert list(sections) == [
         *("Transitions", "Survival", "Distributions", "Summary", "Resilience", "Setup", "Methods")
     ]
@@ -76,7 +76,7 @@ def test_report_of_one_parameter_has_curves_and_no_map(tmp_path):
 
 def test_report_of_two_parameters_has_maps_and_of_robot_counts_scaling(tmp_path):
     vary = {"radio.loss": LOSS, "robots.flock.count": COUNTS}
-    sections, shown = of(ordinary(tmp_path, vary=vary, seeds=(1, 2, 3)), ["order", "aggregation_time_s"])
+    sections, shown = report_of(ordinary(tmp_path, vary=vary, seeds=(1, 2, 3)), ["order", "aggregation_time_s"])
     maps = [part for part in sections["Transitions"].parts if hasattr(part, "svg")]
     assert [part.name for part in maps] == [
         f"map-{response}-radio.loss-robots.flock.count" for response in ("order.final", "aggregation_time_s")
@@ -88,7 +88,7 @@ def test_report_of_two_parameters_has_maps_and_of_robot_counts_scaling(tmp_path)
 
 def test_names_beside_a_number_are_told_apart(tmp_path):
     vary = {"radio.loss": LOSS, "robots.flock.agent": ["flocking", "pso"]}
-    sections, shown = of(ordinary(tmp_path, vary=vary, seeds=(1, 2, 3)), ["order"])
+    sections, shown = report_of(ordinary(tmp_path, vary=vary, seeds=(1, 2, 3)), ["order"])
     assert [row[1] for row in shown.table("response", "at")] == [
         "robots.flock.agent flocking",
         "robots.flock.agent pso",
@@ -98,21 +98,21 @@ def test_names_beside_a_number_are_told_apart(tmp_path):
 
 def test_three_numbers_are_drawn_in_pairs(tmp_path):
     vary = {"a.x": [0, 1, 2], "a.y": [1, 2], "a.z": [3, 4, 5]}
-    sections, _ = of(ordinary(tmp_path, vary=vary, seeds=(1, 2)), ["order"])
+    sections, _ = report_of(ordinary(tmp_path, vary=vary, seeds=(1, 2)), ["order"])
     names = [part.name for part in sections["Transitions"].parts if hasattr(part, "svg")]
     assert names == [f"map-order.final-{pair}" for pair in ("a.x-a.y", "a.x-a.z", "a.y-a.z")]
 
 
 def test_report_of_a_single_point_has_only_table_and_survival(tmp_path):
-    sections, shown = of(ordinary(tmp_path, vary={}, points=[{}]))
+    sections, shown = report_of(ordinary(tmp_path, vary={}, points=[{}]))
     assert list(sections) == ["Survival", "Summary", "Setup", "Methods"]
     assert shown.table("n", "median")[0][0] == "6"
 
 
 def test_many_points_are_put_together_into_ranges(tmp_path):
-    points = [{"radio.loss": place / 100, "robots.flock.count": place % 3 + 1} for place in range(80)]
+    points = [{"radio.loss": index / 100, "robots.flock.count": index % 3 + 1} for index in range(80)]
     vary = {path: [point[path] for point in points] for path in points[0]}
-    _, shown = of(ordinary(tmp_path, vary=vary, points=points, design="random", seeds=(1,)), ["order"])
+    _, shown = report_of(ordinary(tmp_path, vary=vary, points=points, design="random", seeds=(1,)), ["order"])
     rows = shown.table("parameter", "value")
     assert [row[0] for row in rows] == ["radio.loss"] * 8 + ["robots.flock.count"] * 3
     assert sum(int(row[2]) for row in rows[:8]) == sum(int(row[2]) for row in rows[8:]) == 80
@@ -120,15 +120,15 @@ def test_many_points_are_put_together_into_ranges(tmp_path):
 
 
 def test_pooled_tables_count_runs_and_seeds(tmp_path):
-    vary = {"radio.loss": [place / 100 for place in range(16)], "robots.flock.count": [1, 2, 3, 4, 5]}
-    _, shown = of(ordinary(tmp_path, vary=vary, seeds=FEW), ["order"])
+    vary = {"radio.loss": [index / 100 for index in range(16)], "robots.flock.count": [1, 2, 3, 4, 5]}
+    _, shown = report_of(ordinary(tmp_path, vary=vary, seeds=FEW), ["order"])
     rows = shown.table("parameter", "value")
     assert [row[2:4] for row in rows] == [["30", "6"]] * 16 + [["96", "6"]] * 5
 
 
 def test_runs_that_a_stop_condition_ended_first_have_a_column(tmp_path):
     times = {"slow_s": lambda *_: 60.0}
-    _, shown = of(ordinary(tmp_path, times=times, stopped={0: 8.5, 1: 20.0}), ["slow_s"])
+    _, shown = report_of(ordinary(tmp_path, times=times, stopped={0: 8.5, 1: 20.0}), ["slow_s"])
     rows = shown.table("radio.loss", "n")
     assert [row[-1] for row in rows] == ["2 of 6, from 8.5 s", "–", "–", "–"]
 
@@ -137,7 +137,9 @@ def test_scaling_has_intervals_and_one_restriction_time(tmp_path):
     def time_s(point, rng):
         return float(rng.exponential(100.0 / point["robots.flock.count"]))
 
-    _, shown = of(ordinary(tmp_path, vary={"robots.flock.count": COUNTS}, seeds=range(30), times={"task_s": time_s}))
+    _, shown = report_of(
+        ordinary(tmp_path, vary={"robots.flock.count": COUNTS}, seeds=range(30), times={"task_s": time_s})
+    )
     rows = shown.table("robots.flock.count", "mean time in s")
     assert rows[0][2:] == ["1.000", "1.000", "–"]
     for row in rows[1:]:
@@ -148,7 +150,9 @@ def test_scaling_has_intervals_and_one_restriction_time(tmp_path):
 def test_numbers_in_the_table_are_those_of_the_runs(tmp_path):
     values = iter([3.0, 1.0, 2.0, 5.0, 4.0, *[7.5] * 5])
     numbers = {"gap_m.final": lambda *_: next(values)}
-    _, shown = of(write_campaign(tmp_path / "a", {"radio.loss": [0.0, 0.5]}, range(5), numbers=numbers, times={}))
+    _, shown = report_of(
+        write_campaign(tmp_path / "a", {"radio.loss": [0.0, 0.5]}, range(5), numbers=numbers, times={})
+    )
     [first, second] = shown.table("radio.loss", "n", "median", "quartiles", "95 % interval of the median")
     assert first[:4] == ["0", "5", "3.0", "2.0 to 4.0"]
     assert second == ["0.5", "5", "7.5", "7.5", "7.5"]
@@ -159,7 +163,7 @@ def test_quartiles_of_times_beyond_the_limit_say_so(tmp_path):
     drawn = {key: iter(times) for key, times in arrive.items()}
     times = {"found_s": lambda point, _: next(drawn[point["who"]])}
     folder = write_campaign(tmp_path / "a", {"who": list(arrive)}, range(10), numbers={}, times=times, limit_s=120.0)
-    sections, shown = of(folder)
+    sections, shown = report_of(folder)
     cells = {row[0]: row[2:] for row in shown.table("who", "n")}
     assert cells["early"][:2] == ["10", "10"]
     assert cells["late"][:2] == ["> 120 s", "10 to > 120 s"]
@@ -171,19 +175,19 @@ def test_quartiles_of_times_beyond_the_limit_say_so(tmp_path):
 def test_limit_of_a_time_is_not_rounded_up_beyond_what_was_observed(tmp_path):
     times = {"found_s": lambda point, _: None if point["who"] == "never" else 2.0}
     folder = write_campaign(tmp_path / "a", {"who": ["soon", "never"]}, range(4), numbers={}, times=times, limit_s=2.6)
-    _, shown = of(folder)
+    _, shown = report_of(folder)
     assert [row[3] for row in shown.table("who", "n")][-1] == "> 2.6 s"
 
 
 def test_without_times_nothing_is_said_of_survival(tmp_path):
-    sections, shown = of(ordinary(tmp_path, times={}))
+    sections, shown = report_of(ordinary(tmp_path, times={}))
     assert "Survival" not in sections
     assert not any("Kaplan" in text for text in shown.said)
 
 
 def test_failed_and_missing_runs_are_told_with_what_to_do(tmp_path):
     folder = ordinary(tmp_path, failed=(3, 4, 20), missing=(7, 8), parts=3)
-    _, shown = of(folder)
+    _, shown = report_of(folder)
     assert ["runs", "19 done, 3 failed, 2 missing"] in shown.table("scenario")
     assert shown.table("error", "runs") == [["the agent of flock-0 failed", "3", "3", "0, 3"]]
     listings = "\n".join(shown.said)
@@ -195,28 +199,28 @@ def test_failed_and_missing_runs_are_told_with_what_to_do(tmp_path):
 def test_ranges_that_points_were_drawn_from_are_told(tmp_path):
     folder = ordinary(tmp_path, design="random")
     about = json.loads((folder / "campaign.json").read_text())
-    told = {
+    campaign = {
         "vary": {"radio.loss": {"from": 0, "to": 0.6}},
         "began_utc": "20260102T030405Z",
         "overrides": ["a=1", "b=2"],
     }
-    (folder / "campaign.json").write_text(json.dumps(about | told))
-    _, shown = of(folder)
+    (folder / "campaign.json").write_text(json.dumps(about | campaign))
+    _, shown = report_of(folder)
     assert {"from 0 to 0.6", "2026-01-02 03:04 UTC", "a=1, b=2"} <= {row[1] for row in shown.table("scenario")}
 
 
 def test_seeds_are_told_to_the_last_digit(tmp_path):
-    _, shown = of(ordinary(tmp_path, seeds=(20240501, 7)), ["order"])
+    _, shown = report_of(ordinary(tmp_path, seeds=(20240501, 7)), ["order"])
     assert ["seeds", "20240501, 7"] in shown.table("scenario")
 
 
 def test_before_any_run_has_ended_there_is_a_report_all_the_same(tmp_path):
-    sections, _ = of(ordinary(tmp_path, missing=range(24), parts=1))
+    sections, _ = report_of(ordinary(tmp_path, missing=range(24), parts=1))
     assert list(sections) == ["Setup", "Methods"]
 
 
 def test_report_exists_when_every_run_failed(tmp_path):
-    sections, shown = of(ordinary(tmp_path, failed=range(24)))
+    sections, shown = report_of(ordinary(tmp_path, failed=range(24)))
     assert shown.table("error", "runs")[0][1] == "24"
     assert "Transitions" not in sections
 
@@ -227,25 +231,25 @@ def test_constant_and_missing_responses_are_left_out_and_named(tmp_path):
         "components.final": lambda *_: 1.0,
         "gap_m.final": lambda *_: None,
     }
-    _, shown = of(ordinary(tmp_path, numbers=numbers, times={"never_s": lambda *_: None}))
-    said = " ".join(shown.said)
-    assert "Left out (equal in all runs that have a value): components.final ." in said
-    assert "Left out (without a value in any run): gap_m.final and never_s ." in said
+    _, shown = report_of(ordinary(tmp_path, numbers=numbers, times={"never_s": lambda *_: None}))
+    text = " ".join(shown.said)
+    assert "Left out (equal in all runs that have a value): components.final ." in text
+    assert "Left out (without a value in any run): gap_m.final and never_s ." in text
 
 
 def test_responses_that_are_listed_are_shown_even_if_constant(tmp_path):
     numbers = {"order.final": lambda _, rng: rng.random(), "components.final": lambda *_: 1.0}
-    _, shown = of(ordinary(tmp_path, numbers=numbers), ["components", "aggregation_time_s"])
+    _, shown = report_of(ordinary(tmp_path, numbers=numbers), ["components", "aggregation_time_s"])
     assert [row[2] for row in shown.table("radio.loss", "n")] == ["1"] * 4
     with pytest.raises(
         BadInput, check=lambda error: error.key == "ordre" and "order (did you mean this?)" in error.expected
     ):
-        of(tmp_path / "made-up", ["ordre"])
+        report_of(tmp_path / "made-up", ["ordre"])
 
 
 def test_change_point_is_found_where_the_response_jumps(tmp_path):
     step = {"order.final": lambda point, rng: float(point["radio.loss"] < 0.3) + 0.05 * rng.standard_normal()}
-    _, shown = of(ordinary(tmp_path, numbers=step, times={}))
+    _, shown = report_of(ordinary(tmp_path, numbers=step, times={}))
     assert [row[1] for row in shown.table("response", "change point")] == ["0.3"]
 
 
@@ -258,7 +262,7 @@ def test_resilience_names_the_better_of_linear_and_exponential(tmp_path, shape, 
         "order.final": lambda point, rng: float(shape(point["events.0.robots.share"])) + 0.01 * rng.standard_normal(),
         "wait.final": lambda point, rng: 1.0 + point["events.0.robots.share"] + 0.01 * rng.standard_normal(),
     }
-    sections, shown = of(ordinary(tmp_path, vary=vary, numbers=numbers, times={}))
+    sections, shown = report_of(ordinary(tmp_path, vary=vary, numbers=numbers, times={}))
     assert [row[2] for row in shown.table("response", "over", "shape") if row[-1] == "better"] == [better]
     assert "`wait.final`" in str(sections["Resilience"].parts[0])
 
@@ -270,7 +274,7 @@ def test_line_has_no_change_point_and_a_cliff_over_loss_is_a_step(tmp_path):
         "radio.link_pdr": lambda point, rng: 1.0 - point["radio.loss"] + 0.01 * rng.standard_normal(),
         "target_best.final": lambda point, rng: 1.0 - 0.1 * point["radio.loss"] + 0.1 * rng.standard_normal(),
     }
-    sections, shown = of(ordinary(tmp_path, vary={"radio.loss": loss}, numbers=numbers, times={}))
+    sections, shown = report_of(ordinary(tmp_path, vary={"radio.loss": loss}, numbers=numbers, times={}))
     steps = {row[0]: row[1] for row in shown.table("response", "change point")}
     assert (steps["order.final"], steps["radio.link_pdr"]) == ("0.75", "none")
     fits = {
@@ -292,7 +296,7 @@ def test_labels_stand_in_figures_and_unknown_ones_are_refused(tmp_path):
 
 
 def test_scenario_name_with_markup_is_escaped_in_a_report(tmp_path):
-    _, shown = of(ordinary(tmp_path, name="<script>alert(1)</script> & co"))
+    _, shown = report_of(ordinary(tmp_path, name="<script>alert(1)</script> & co"))
     assert "<script>alert(1)</script> & co" in shown.said
     check_alone(shown)
 
@@ -361,8 +365,8 @@ def test_levels_up_to_the_maximum_stay_apart():
 def test_more_values_become_ranges_that_hold_every_point_once(values):
     levels = levels_of("x", tuple({"x": x} for x in values))
     assert levels.number is not None
-    found = sorted(point for level in range(len(levels)) for point in levels.points(level))
-    assert found == list(range(100))
+    points = sorted(point for level in range(len(levels)) for point in levels.points(level))
+    assert points == list(range(100))
     assert len(levels) <= 8
     for level, label in enumerate(levels.labels):
         part = [values[point] for point in levels.points(level)]
@@ -412,7 +416,7 @@ def test_responses_are_drawn_with_and_without_a_limit_and_side_by_side(values, l
 @pytest.mark.parametrize("columns", [1, 3, 12])
 def test_maps_are_drawn_of_equal_of_no_and_of_censored_medians(value, columns):
     values = np.full((2, columns), value)
-    labels = [str(place) for place in range(columns)]
+    labels = [str(index) for index in range(columns)]
     jumps = [None, Jump(0.5, 0.0, 1.0)]
     assert svg_of(heat_map(HeatMap(values, labels, ["a", "b"], jumps), "what", "x", "y"))
 
@@ -454,9 +458,9 @@ pytest.importorskip("matplotlib", reason="needs the extra [report]")
 def browser():
     """Skips where there is none that starts."""
     for name in ("chromium", "chromium-browser", "google-chrome"):
-        found = shutil.which(name)
-        if found and subprocess.run([found, "--version"], capture_output=True, timeout=60, check=False).returncode == 0:
-            return found
+        path = shutil.which(name)
+        if path and subprocess.run([path, "--version"], capture_output=True, timeout=60, check=False).returncode == 0:
+            return path
     pytest.skip("needs chromium")
 
 

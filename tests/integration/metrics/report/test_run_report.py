@@ -50,8 +50,8 @@ def texts(report):
 def table(report, caption):
     """The rows of the one table whose caption begins so, by their first cell."""
     parts = [part for section in report.sections for part in section.parts if isinstance(part, ReportTable)]
-    found = next(part for part in parts if part.caption.startswith(caption))
-    return {row[0]: row[1:] for row in found.rows}
+    match = next(part for part in parts if part.caption.startswith(caption))
+    return {row[0]: row[1:] for row in match.rows}
 
 
 def names(report):
@@ -65,8 +65,8 @@ def test_report_of_all_tables_has_every_figure_and_numbers_of_the_summary(tmp_pa
     summary = RunFolder(folder).summary
     assert summary is not None
     fates = table(report, "Fates of packets")
-    told = {name: int(row[0].replace(",", "")) for name, row in fates.items()}
-    assert told == {name.replace("_", " "): count for name, count in summary["radio"]["fates"].items() if count}
+    counts = {name: int(row[0].replace(",", "")) for name, row in fates.items()}
+    assert counts == {name.replace("_", " "): count for name, count in summary["radio"]["fates"].items() if count}
     metrics = table(report, "Metrics over")
     assert metrics["order"][:4] == tuple(
         number(summary["metrics"]["order"][key]) for key in ("final", "mean", "min", "max")
@@ -82,9 +82,9 @@ def test_tables_that_were_not_recorded_are_named_with_the_command_that_records_t
     folder = run_folder(tmp_path, static(6), ticks(DISK, static(6), 3))
     report = run_report(folder)
     assert names(report) == ["timeline", "trajectories", "metrics", "delivery-by-distance"]
-    said = texts(report)
-    assert all(name in said for name in ("`packets`", "`radio_links`"))
-    assert f"swarmwire repeat {folder.name} --packets all --links --out {folder.name}-again" in said
+    text = texts(report)
+    assert all(name in text for name in ("`packets`", "`radio_links`"))
+    assert f"swarmwire repeat {folder.name} --packets all --links --out {folder.name}-again" in text
     assert table(report, "Latencies of all packets")["on air"]
 
 
@@ -94,15 +94,15 @@ def test_links_come_from_packets_where_they_were_not_counted(tmp_path):
 
 
 def test_report_of_a_run_without_a_radio_says_so(tmp_path):
-    of = static(4, radio=False)
-    report = run_report(run_folder(tmp_path, of, wandering(of, 12)))
+    run = static(4, radio=False)
+    report = run_report(run_folder(tmp_path, run, wandering(run, 12)))
     assert names(report) == ["timeline", "trajectories", "metrics"]
     assert "no radio" in texts(report)
 
 
 def test_report_of_several_arenas_draws_the_first_and_tabulates_all(tmp_path):
-    of = static(5, arenas=3)
-    report = run_report(run_folder(tmp_path, of, ticks(DISK, of, 4, count=20), links=True))
+    run = static(5, arenas=3)
+    report = run_report(run_folder(tmp_path, run, ticks(DISK, run, 4, count=20), links=True))
     assert "first of 3 arenas, seed 1" in texts(report)
     assert list(table(report, "All arenas")) == ["1", "2", "3"]
     assert table(report, "All arenas")["3"][-1] == f"{2:064x}"[:16] + "…"
@@ -115,19 +115,19 @@ def test_report_of_several_arenas_draws_the_first_and_tabulates_all(tmp_path):
 
 
 def test_report_of_a_killed_run_reaches_to_its_last_tick(tmp_path):
-    of = static(6)
-    seen = list(ticks(DISK, of, 3, count=30))
+    run = static(6)
+    truths = list(ticks(DISK, run, 3, count=30))
     (tmp_path / "killed").mkdir()
-    killed = run_folder(tmp_path / "killed", of, seen, summary=False, packets=1.0)
+    killed = run_folder(tmp_path / "killed", run, truths, summary=False, packets=1.0)
     (tmp_path / "killed" / "radio_distances.parquet").unlink()
     report = run_report(killed)
     assert names(report) == ["timeline", "trajectories", "metrics", "latency", "links"]
     assert "2.9 s of 5 s" in table(report, "")["ended"][0]
     assert "`radio_distances`" in texts(report)
     (tmp_path / "whole").mkdir()
-    whole = read_run(run_folder(tmp_path / "whole", of, seen))
+    complete = read_run(run_folder(tmp_path / "whole", run, truths))
     for name, values in metric_statistics(read_run(killed)).items():
-        expected = metric_statistics(whole)[name]
+        expected = metric_statistics(complete)[name]
         assert {key: pytest.approx(value, nan_ok=True) for key, value in expected.items()} == values, name
 
 
@@ -140,16 +140,16 @@ def test_report_of_a_run_without_a_tick_has_no_figures(tmp_path):
 
 @pytest.mark.parametrize("radio", [True, False])
 def test_report_of_a_lone_robot_exists_with_and_without_a_radio(tmp_path, radio):
-    of = static(1, radio=radio)
+    run = static(1, radio=radio)
     silent = {"departed": departed([]), "finished": links([], [], 0, 0), "tally": tally({})} if radio else {}
-    report = run_report(run_folder(tmp_path, of, wandering(of, 9, **silent), links=True))
+    report = run_report(run_folder(tmp_path, run, wandering(run, 9, **silent), links=True))
     assert names(report)[:2] == ["timeline", "trajectories"]
     assert ("no two robots were in range" in texts(report)) == radio
 
 
 def test_names_with_markup_are_escaped_in_a_report(tmp_path):
-    of = replace(static(3), name="<script>alert(1)</script>", robot_names=("<b>", "&", "$x_1$"))
-    html = page(run_report(run_folder(tmp_path, of, ticks(DISK, of, 3), links=True)))
+    run = replace(static(3), name="<script>alert(1)</script>", robot_names=("<b>", "&", "$x_1$"))
+    html = page(run_report(run_folder(tmp_path, run, ticks(DISK, run, 3), links=True)))
     assert "<script" not in html
     assert "<b>" not in html
     assert "&lt;script&gt;" in html
@@ -169,16 +169,16 @@ def test_damaged_table_costs_its_figure_and_is_named(tmp_path):
 
 
 def test_events_are_listed_with_the_robots_that_they_changed(tmp_path):
-    of = static(3)
+    run = static(3)
     kill = EventRecord(0, 0.1, "kill", False, np.array([False, True, True]))
-    seen = [replace(one, events=(kill,) if one.tick == 1 else ()) for one in wandering(of, 6)]
-    report = run_report(run_folder(tmp_path, of, seen))
+    truths = [replace(one, events=(kill,) if one.tick == 1 else ()) for one in wandering(run, 6)]
+    report = run_report(run_folder(tmp_path, run, truths))
     assert table(report, "All events") == {"0.1": ("kill", "flock-1, flock-2")}
 
 
 def test_stop_of_a_run_and_times_of_metrics_are_marked_in_a_report(tmp_path, monkeypatch):
-    of, drawn = static(3), []
-    folder = run_folder(tmp_path, of, wandering(of, 20), ended="stopped")
+    run, drawn = static(3), []
+    folder = run_folder(tmp_path, run, wandering(run, 20), ended="stopped")
     summary = json.loads((folder / "summary.json").read_text())
     end = {
         "ended": "stopped",
@@ -189,9 +189,11 @@ def test_stop_of_a_run_and_times_of_metrics_are_marked_in_a_report(tmp_path, mon
     }
     (folder / "summary.json").write_text(json.dumps({**summary, "stop": [end["stopped_by"]], "by_arena": [end]}))
     file = folder / "ticks.parquet"
-    found = pl.when(pl.col("tick") > 11).then(1.2).alias("aggregation_time_s")
-    pl.read_parquet(file).with_columns(found).write_parquet(file)
-    monkeypatch.setattr(run_timeline, "timeline", lambda *of: (drawn.append(of), blank_figure(1.0, 1.0))[1])
+    column = pl.when(pl.col("tick") > 11).then(1.2).alias("aggregation_time_s")
+    pl.read_parquet(file).with_columns(column).write_parquet(file)
+    monkeypatch.setattr(
+        run_timeline, "timeline", lambda *arguments: (drawn.append(arguments), blank_figure(1.0, 1.0))[1]
+    )
     report = run_report(folder)
     [(_, _, lanes)] = drawn
     assert {lane.kind: lane.spans for lane in lanes} == {
@@ -216,8 +218,8 @@ def test_lateness_of_a_real_time_run_is_reported(tmp_path):
         "delivery": None,
     }
     frames = {"sent": 1100, "sent_bytes": 220_000, "delivered": 1500, "delivered_bytes": 300_000, "late": 15}
-    told = {**summary, "realtime": pace, "interfaces": {**frames, "delivery": delays}}
-    (folder / "summary.json").write_text(json.dumps(told))
+    changed_summary = {**summary, "realtime": pace, "interfaces": {**frames, "delivery": delays}}
+    (folder / "summary.json").write_text(json.dumps(changed_summary))
     report = run_report(folder)
     assert table(report, "Lateness") == {
         "ticks": ("6", "1.1", "2.9", "7.1"),
@@ -240,8 +242,8 @@ def test_gaps_in_poses_from_outside_are_reported_by_robot_the_longest_first(tmp_
         "silent_ticks": {"flock-1": 5},
     }
     pace = {"factor": 1.0, "missed_ticks": 0, "worst_lag_s": 0.0, "subtick_s": None, "tick_jitter": None}
-    told = {**summary, "realtime": {**pace, "delivery": None}, "poses": [source]}
-    (folder / "summary.json").write_text(json.dumps(told))
+    changed_summary = {**summary, "realtime": {**pace, "delivery": None}, "poses": [source]}
+    (folder / "summary.json").write_text(json.dumps(changed_summary))
     report = run_report(folder)
     gaps = table(report, "Poses from udp 127.0.0.1:9870: 1,234 were used, 99 % of them within 1.1 ms of their arrival")
     assert list(gaps.items()) == [("flock-1", ("1.5", "5")), ("flock-2", ("0.25", "0")), ("flock-0", ("0.021", "0"))]
@@ -280,19 +282,19 @@ def test_lockstep_run_has_no_section_on_real_time(tmp_path):
 
 
 def test_custom_metric_is_reported_by_its_recorded_facts(tmp_path):
-    of = static(3)
-    folder = run_folder(tmp_path, of, wandering(of, 20), summary=False)
+    run = static(3)
+    folder = run_folder(tmp_path, run, wandering(run, 20), summary=False)
     gas = MetricInfo("gas", "what it smells of", "ppm", "count", (0.0, None))
-    found = MetricInfo("gas_found", "when it did", "s", "time", (0.0, None))
+    detection = MetricInfo("gas_found", "when it did", "s", "time", (0.0, None))
     started = json.loads((folder / "run.json").read_text())
-    (folder / "run.json").write_text(json.dumps({**started, "metrics": [asdict(gas), asdict(found)]}))
+    (folder / "run.json").write_text(json.dumps({**started, "metrics": [asdict(gas), asdict(detection)]}))
     file = folder / "ticks.parquet"
     own = (pl.col("tick") * 2.0).alias("gas"), pl.when(pl.col("tick") > 9).then(1.0).alias("gas_found")
     pl.read_parquet(file).with_columns(*own).write_parquet(file)
     metrics = table(run_report(folder), "Metrics over")
     assert metrics["gas"][:5] == ("38", "1.9", "0", "2", "ppm")
-    (smells, adds_up), (found, is_time) = (metrics[name][-1].split("; ") for name in ("gas", "gas_found"))
-    assert (smells, found) == ("what it smells of", "when it did")
+    (smells, adds_up), (when, is_time) = (metrics[name][-1].split("; ") for name in ("gas", "gas_found"))
+    assert (smells, when) == ("what it smells of", "when it did")
     assert adds_up != is_time
     film = read_run(folder).film
     assert not isinstance(film, str)
@@ -336,7 +338,7 @@ def test_event_end_belongs_to_the_first_open_event_of_the_same_robots():
     kill, motors = Lane("kill"), Lane("fail motors")
     kill.spans, kill.robots = [Span(1.0, 6.0), Span(2.0, 5.0)], {"a", "b"}
     motors.spans, motors.robots = [Span(3.0, None)], {"c"}
-    found = lanes_of(
+    lanes = lanes_of(
         events(
             ("kill", "", 1.0, False, ["a"]),
             ("kill", "", 2.0, False, ["b"]),
@@ -346,24 +348,24 @@ def test_event_end_belongs_to_the_first_open_event_of_the_same_robots():
             ("revive", "", 7.0, True, ["a"]),
         )
     )
-    assert found == [kill, motors]
+    assert lanes == [kill, motors]
 
 
 def test_thinned_curves_keep_their_peaks_and_gaps():
     value = np.sin(np.arange(10_000) / 300)
     value[777], value[888], value[4000:6000] = 9.0, -9.0, np.nan
-    kept = thinned(value, 100)
-    assert len(kept) <= 102
-    assert {0, 777, 888, 9999} <= set(kept.tolist())
-    assert (np.diff(kept) > 0).all()
-    assert np.isnan(value[kept]).any()
+    indices = thinned(value, 100)
+    assert len(indices) <= 102
+    assert {0, 777, 888, 9999} <= set(indices.tolist())
+    assert (np.diff(indices) > 0).all()
+    assert np.isnan(value[indices]).any()
     assert thinned(np.zeros(7), 7).tolist() == list(range(7))
 
 
 def test_trajectories_of_a_small_run_have_every_position():
-    of = two_groups()
+    run = two_groups()
     place_m = np.random.default_rng(1).uniform(-3, 3, (30, 3, 2))
-    paths = paths_of(place_m, of)
+    paths = paths_of(place_m, run)
     drawn = np.stack(paths.line(np.array([0, 2]), 0, 29), axis=1)
     np.testing.assert_array_equal(drawn[:30], place_m[:, 0])
     assert np.isnan(drawn[30]).all()
@@ -372,13 +374,13 @@ def test_trajectories_of_a_small_run_have_every_position():
 
 
 def test_on_a_torus_the_pen_is_lifted_at_the_seam():
-    of = replace(two_groups(), boundary="torus")  # 8 x 6 m
+    run = replace(two_groups(), boundary="torus")  # 8 x 6 m
     along = np.array([2.0, 3.0, 3.9, -3.5, -3.0])
     place_m = np.zeros((5, 3, 2))
     place_m[:, 0, 0] = along
-    x, _ = paths_of(place_m, of).line(np.array([0]), 0, 4)
-    known = x[: np.flatnonzero(~np.isnan(x))[-1] + 1]
-    np.testing.assert_array_equal(known, [2.0, 3.0, 3.9, np.nan, -3.5, -3.0])
+    x, _ = paths_of(place_m, run).line(np.array([0]), 0, 4)
+    trail_m = x[: np.flatnonzero(~np.isnan(x))[-1] + 1]
+    np.testing.assert_array_equal(trail_m, [2.0, 3.0, 3.9, np.nan, -3.5, -3.0])
 
 
 def test_trajectories_of_large_runs_are_thinned_from_start_to_end():
@@ -391,11 +393,11 @@ def test_trajectories_of_large_runs_are_thinned_from_start_to_end():
 
 @pytest.mark.parametrize(("robots", "most_bytes"), [(100, 700_000), (1000, 1_500_000)])
 def test_trajectories_of_many_robots_stay_light(robots, most_bytes):
-    of = replace(static(robots), arena_size_m=(30.0, 30.0))
+    run = replace(static(robots), arena_size_m=(30.0, 30.0))
     steps = np.random.default_rng(2).normal(0.0, 0.05, (600, robots, 2))
     place_m = np.cumsum(steps, axis=0) + np.random.default_rng(3).uniform(-14, 14, (robots, 2))
     pose = np.concatenate([place_m[-1], np.zeros((robots, 1))], axis=1)
-    figure = trajectories(of, 0, paths_of(place_m, of), Ending(pose, np.ones(robots, np.bool_), None, 59.9))
+    figure = trajectories(run, 0, paths_of(place_m, run), Ending(pose, np.ones(robots, np.bool_), None, 59.9))
     assert len(svg_of(figure)) < most_bytes
 
 
@@ -429,25 +431,25 @@ def test_latencies_add_up_to_all_receivers_and_show_their_percentiles():
 
 @pytest.mark.parametrize("radio", RADIOS[:3])
 def test_packets_tell_when_their_receivers_act_as_the_summary_does(tmp_path, radio):
-    of = static(5)
-    seen = list(ticks(radio, of, 7, count=40))
-    latencies, agent_ns = Latencies(of), []
-    for one in seen:
+    run = static(5)
+    truths = list(ticks(radio, run, 7, count=40))
+    latencies, agent_ns = Latencies(run), []
+    for one in truths:
         assert one.finished is not None
         agent_ns += latencies.measure(one.finished, one.tick)[2].tolist()
-    record(tmp_path, of, seen, packets=1.0)
+    record(tmp_path, run, truths, packets=1.0)
     received = RunFolder(tmp_path).packets().filter(pl.col("fate") == "received")
     final, sent, receiver = (received[name].to_numpy() for name in ("final_at_ns", "sent_at_ns", "receiver"))
-    assert sorted(receivers_act_at_ns(final, receiver, of) - sent) == sorted(agent_ns)
+    assert sorted(receivers_act_at_ns(final, receiver, run) - sent) == sorted(agent_ns)
     assert len(agent_ns) > 20
 
 
 def test_links_add_up_to_the_account_of_the_radio(tmp_path):
-    of = static(6)
-    seen = list(ticks(RADIOS[1], of, 3, count=30))
-    record(tmp_path, of, seen, links=True)
-    received, in_range = link_counts(RunFolder(tmp_path).radio_links(), of.robots)
-    fates = np.sum([one.tally.fates[0] for one in seen if one.tally], axis=0)
+    run = static(6)
+    truths = list(ticks(RADIOS[1], run, 3, count=30))
+    record(tmp_path, run, truths, links=True)
+    received, in_range = link_counts(RunFolder(tmp_path).radio_links(), run.robots)
+    fates = np.sum([one.tally.fates[0] for one in truths if one.tally], axis=0)
     assert received.sum() == fates[Fate.RECEIVED]
     assert (received <= in_range).all()
     assert not in_range.diagonal().any()

@@ -26,28 +26,28 @@ HASHES = ["a" * 64, "b" * 64]
 DIGEST = sha256("".join(HASHES).encode()).digest()[:8]
 
 
-def seen_ticks(of):
+def seen_ticks(run):
     kill = EventRecord(0, 0.0, "kill", False, np.array([False, True, False] * ARENAS))
     ended = links([0, 0, 1], [1, 2, 0], [5, 5, 6], 1, arena=[0, 0, 1], fate=[Fate.RECEIVED, Fate.LOST, Fate.RECEIVED])
     counted = tally({Fate.RECEIVED: 1, Fate.LOST: 1, Fate.OUT_OF_RANGE: 3}, {Fate.RECEIVED: 1})
-    yield from wandering(of, TICKS, events=(kill,), finished=ended, tally=counted)
+    yield from wandering(run, TICKS, events=(kill,), finished=ended, tally=counted)
 
 
-def summarise(folder, of, recorded, **given):
+def summarise(folder, run, recorded, **changes):
     """The summary of a run of these ticks, as deploy writes it."""
     parts = {}
     for observer in (Metrics(), RadioTally(), EventLog()):
-        watch(of, seen_ticks(of), observer)
+        watch(run, seen_ticks(run), observer)
         parts.update(observer.end(tally({Fate.IN_FLIGHT: 4}, {})))
-    run = made_up_summary(TICKS, arenas=ARENAS, record=recorded, trajectory_sha256=HASHES, **parts)
-    (folder / "summary.json").write_text(json.dumps({**run, **given}))
+    summary = made_up_summary(TICKS, arenas=ARENAS, record=recorded, trajectory_sha256=HASHES, **parts)
+    (folder / "summary.json").write_text(json.dumps({**summary, **changes}))
 
 
-def fill(folder, **given):
+def fill(folder, **changes):
     """A whole run folder, its summary changed by what is given."""
-    of = static(3, arenas=ARENAS)
-    recorded = record(folder, of, seen_ticks(of), packets=given.pop("share", 1.0))
-    summarise(folder, of, given.pop("record", recorded), **given)
+    run = static(3, arenas=ARENAS)
+    recorded = record(folder, run, seen_ticks(run), packets=changes.pop("share", 1.0))
+    summarise(folder, run, changes.pop("record", recorded), **changes)
     log = RunLog(folder)
     log.append("begins")
     log.close()
@@ -95,7 +95,7 @@ def test_whole_run_folder_has_no_fault_and_is_unchanged_by_verify(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("gone", "wrong"),
+    ("path", "wrong"),
     [
         ("summary.json", {"summary.json": TableState.MISSING, "trajectory.digests": TableState.PARTIAL}),
         ("static.json", {"static.json": TableState.MISSING}),
@@ -107,9 +107,9 @@ def test_whole_run_folder_has_no_fault_and_is_unchanged_by_verify(tmp_path):
         ("events.parquet", {"events": TableState.MISSING}),
     ],
 )
-def test_missing_file_of_a_run_folder_is_named(tmp_path, gone, wrong):
+def test_missing_file_of_a_run_folder_is_named(tmp_path, path, wrong):
     fill(tmp_path)
-    (tmp_path / gone).unlink()
+    (tmp_path / path).unlink()
     assert states(tmp_path) == wrong
 
 
@@ -117,19 +117,19 @@ def test_missing_file_of_a_run_folder_is_named(tmp_path, gone, wrong):
 @pytest.mark.parametrize("cut", [0.0, 0.5, 0.98])
 def test_truncated_file_of_a_run_folder_is_damaged(tmp_path, part, cut):
     fill(tmp_path)
-    whole = (tmp_path / part).read_bytes()
-    (tmp_path / part).write_bytes(whole[: int(cut * len(whole))])
-    found = states(tmp_path)
-    assert found.pop(part.removesuffix(".parquet")) == TableState.DAMAGED
-    assert found == ({"trajectory.digests": TableState.PARTIAL} if part == "summary.json" else {})
+    data = (tmp_path / part).read_bytes()
+    (tmp_path / part).write_bytes(data[: int(cut * len(data))])
+    findings = states(tmp_path)
+    assert findings.pop(part.removesuffix(".parquet")) == TableState.DAMAGED
+    assert findings == ({"trajectory.digests": TableState.PARTIAL} if part == "summary.json" else {})
 
 
 def test_bytes_turned_over_within_a_table_are_found(tmp_path):
     fill(tmp_path)
     path = tmp_path / "ticks.parquet"
     data = bytearray(path.read_bytes())
-    for place in range(4, len(data) // 2):
-        data[place] ^= 0xFF
+    for position in range(4, len(data) // 2):
+        data[position] ^= 0xFF
     path.write_bytes(data)
     assert states(tmp_path) == {"ticks": TableState.DAMAGED}
 
@@ -213,7 +213,7 @@ def test_missing_arena_in_a_table_is_found(tmp_path):
 def test_fates_are_not_compared_where_packets_were_sampled_or_dropped_or_the_run_broken_off(tmp_path):
     other = {"radio": [{"fates": {"received": 11}}] * 2}
     rows = {"ticks": {"rows": 20, "dropped": 0}, "events": {"rows": 20, "dropped": 0}}
-    for number, given in enumerate(
+    for number, changes in enumerate(
         [
             {"share": 0.5},
             {"record": {**rows, "packets": {"rows": 1, "dropped": 2, "share": 1.0}}},
@@ -224,7 +224,7 @@ def test_fates_are_not_compared_where_packets_were_sampled_or_dropped_or_the_run
     ):
         folder = tmp_path / f"{number}"
         folder.mkdir()
-        fill(folder, **other, **given)
+        fill(folder, **other, **changes)
         assert states(folder) == {}
 
 
@@ -248,12 +248,12 @@ def test_recording_is_verified_to_its_end(tmp_path):
     from tests.support.metrics import recordings
 
     fill(tmp_path)
-    of = static(3)
-    recordings.record(tmp_path / "run.rrd", of, recordings.moving(of, 7))
+    run = static(3)
+    recordings.record(tmp_path / "run.rrd", run, recordings.moving(run, 7))
     assert states(tmp_path) == {}
     assert "up to tick 6" in text_of(tmp_path, "run.rrd")
-    whole = (tmp_path / "run.rrd").read_bytes()
-    (tmp_path / "run.rrd").write_bytes(whole[: len(whole) * 9 // 10])  # behind the layout of the views
+    data = (tmp_path / "run.rrd").read_bytes()
+    (tmp_path / "run.rrd").write_bytes(data[: len(data) * 9 // 10])  # behind the layout of the views
     assert states(tmp_path) == {"run.rrd": TableState.PARTIAL}
     assert "closed" in text_of(tmp_path, "run.rrd")
     (tmp_path / "run.rrd").write_bytes(b"no recording")
@@ -302,8 +302,8 @@ def test_folder_in_place_of_a_file_is_damaged(tmp_path):
     for name in ("summary.json", "run.json", "trajectory.digests", "log.txt"):
         (tmp_path / name).unlink()
         (tmp_path / name).mkdir()
-    found = states(tmp_path)
-    assert [found[name] for name in ("summary.json", "run.json", "trajectory.digests", "log.txt")] == [
+    findings = states(tmp_path)
+    assert [findings[name] for name in ("summary.json", "run.json", "trajectory.digests", "log.txt")] == [
         TableState.DAMAGED
     ] * 4
 

@@ -39,27 +39,27 @@ def strict():
 
 
 def test_recording_holds_positions_and_headings_of_the_first_arena(tmp_path):
-    of = static(3, arenas=2, obstacles=OBSTACLES)
-    ticks = list(moving(of, 40, edges=edges((0, 1), (4, 5))))
-    record(tmp_path / "run.rrd", of, ticks)
+    run = static(3, arenas=2, obstacles=OBSTACLES)
+    ticks = list(moving(run, 40, edges=edges((0, 1), (4, 5))))
+    record(tmp_path / "run.rrd", run, ticks)
     positions = column(tmp_path / "run.rrd", "/world/robots", "Points2D:positions")
     vectors = column(tmp_path / "run.rrd", "/world/headings", "Arrows2D:vectors")
     assert list(positions) == list(vectors) == list(range(40))
-    for seen in ticks:
-        pose = seen.pose[:3]
-        assert positions[seen.tick] == pose[:, :2].astype(np.float32).tolist()
-        x, y = np.array(vectors[seen.tick]).T
+    for moment in ticks:
+        pose = moment.pose[:3]
+        assert positions[moment.tick] == pose[:, :2].astype(np.float32).tolist()
+        x, y = np.array(vectors[moment.tick]).T
         np.testing.assert_allclose(np.arctan2(y, x), pose[:, 2], atol=1e-5)
 
 
 def test_lit_leds_are_drawn_where_they_sit_until_they_are_dark(tmp_path):
-    of = static(2)
+    run = static(2)
     leds = np.zeros((2, 8), np.int64)
     leds[1, 2] = 0x0080FF  # the one to the left
     pose = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, np.pi / 2]])
-    dark = truth(of, 3, pose=pose), truth(of, 4, pose=pose)
-    lit = truth(of, 1, pose=pose, leds=leds), truth(of, 2, pose=pose, leds=leds)
-    record(tmp_path / "run.rrd", of, [truth(of, 0, pose=pose), *lit, *dark])
+    dark = truth(run, 3, pose=pose), truth(run, 4, pose=pose)
+    lit = truth(run, 1, pose=pose, leds=leds), truth(run, 2, pose=pose, leds=leds)
+    record(tmp_path / "run.rrd", run, [truth(run, 0, pose=pose), *lit, *dark])
     positions = column(tmp_path / "run.rrd", "/world/leds", "Points2D:positions")
     np.testing.assert_allclose(positions.pop(1), [[1.0 - 0.042, 2.0]], atol=1e-6)
     np.testing.assert_allclose(positions.pop(2), [[1.0 - 0.042, 2.0]], atol=1e-6)
@@ -68,30 +68,30 @@ def test_lit_leds_are_drawn_where_they_sit_until_they_are_dark(tmp_path):
 
 
 def test_links_join_the_positions_of_the_robots_that_an_edge_names(tmp_path):
-    of = static(3, arenas=2)
-    [seen] = moving(of, 1, edges=edges((0, 2), (3, 4)))
-    record(tmp_path / "run.rrd", of, [seen])
+    run = static(3, arenas=2)
+    [moment] = moving(run, 1, edges=edges((0, 2), (3, 4)))
+    record(tmp_path / "run.rrd", run, [moment])
     strips = column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips")
-    assert strips == {0: [seen.pose[[0, 2], :2].astype(np.float32).tolist()]}
+    assert strips == {0: [moment.pose[[0, 2], :2].astype(np.float32).tolist()]}
 
 
 @pytest.mark.parametrize(("robots", "expected"), [(200, list(range(12))), (201, [0, 10])])
 def test_links_of_large_swarms_are_thinned(tmp_path, robots, expected):
-    of = static(robots)
-    record(tmp_path / "run.rrd", of, moving(of, 12, edges=edges((0, 1))))
+    run = static(robots)
+    record(tmp_path / "run.rrd", run, moving(run, 12, edges=edges((0, 1))))
     assert list(column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips")) == expected
 
 
 def test_plots_hold_what_the_metrics_measured_in_each_tick(tmp_path):
-    of, metrics = static(4), Metrics()
+    run, metrics = static(4), Metrics()
     expected = {metric.name: {} for metric in metrics.metrics}
-    ticks = list(moving(of, 30, edges=edges((0, 1)), contact_onsets=np.array([[1, 0]])))
-    metrics.begin(of)
-    for seen in ticks:
-        metrics.see(seen)
+    ticks = list(moving(run, 30, edges=edges((0, 1)), contact_onsets=np.array([[1, 0]])))
+    metrics.begin(run)
+    for moment in ticks:
+        metrics.see(moment)
         for name, value in metrics.latest.items():
-            expected[name][seen.tick] = value[0]
-    record(tmp_path / "run.rrd", of, ticks)
+            expected[name][moment.tick] = value[0]
+    record(tmp_path / "run.rrd", run, ticks)
     drawn = {}
     for plot in ("shares", "distances", "times", "numbers"):
         drawn |= series(tmp_path / "run.rrd", plot)
@@ -105,9 +105,9 @@ def test_plots_hold_what_the_metrics_measured_in_each_tick(tmp_path):
 
 
 def test_packets_are_drawn_by_fate_as_receivers_per_second_once_a_fate_occurs(tmp_path):
-    of = static(4)
+    run = static(4)
     counts = [{Fate.RECEIVED: tick % 3, Fate.LOST: 2 if tick >= 12 else 0, Fate.OUT_OF_RANGE: 9} for tick in range(40)]
-    record(tmp_path / "run.rrd", of, [truth(of, tick, tally=tally(count)) for tick, count in enumerate(counts)])
+    record(tmp_path / "run.rrd", run, [truth(run, tick, tally=tally(count)) for tick, count in enumerate(counts)])
     drawn = series(tmp_path / "run.rrd", "packets")
     assert drawn.keys() == {"received", "lost"}
     assert min(drawn["lost"]) == 12
@@ -124,16 +124,16 @@ def test_packets_are_drawn_by_fate_as_receivers_per_second_once_a_fate_occurs(tm
 
 
 def test_robots_are_told_apart_by_group_and_state_and_the_dead_are_grey(tmp_path):
-    of = static(3)
-    of = replace(of, groups=(replace(of.groups[0], stop=2), Group("b", of.groups[0].body, 2, 3)))
+    run = static(3)
+    run = replace(run, groups=(replace(run.groups[0], stop=2), Group("b", run.groups[0].body, 2, 3)))
     states = ("", "search", "carry")
     alive = [[True, True, True], [True, True, True], [True, False, True], [True, True, True], [True, True, True]]
     at = [[0, 0, 0], [1, 0, 0], [1, 0, 2], [1, 1, 2], [1, 1, 2]]
     ticks = [
-        truth(of, tick, alive=np.array(living), state=np.array(state), states=states)
+        truth(run, tick, alive=np.array(living), state=np.array(state), states=states)
         for tick, (living, state) in enumerate(zip(alive, at, strict=True))
     ]
-    record(tmp_path / "run.rrd", of, ticks)
+    record(tmp_path / "run.rrd", run, ticks)
     named = class_names(tmp_path / "run.rrd")
     classes = column(tmp_path / "run.rrd", "/world/robots", "Points2D:class_ids")
     assert {tick: [named[one][0] for one in row] for tick, row in classes.items()} == {
@@ -158,22 +158,22 @@ def test_robots_are_told_apart_by_group_and_state_and_the_dead_are_grey(tmp_path
 
 
 def test_dead_robots_are_crossed_out_where_they_are_until_they_live(tmp_path):
-    of = static(2)
+    run = static(2)
     pose = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.0]])
     lives = [[True, True], [True, False], [True, False], [False, False], [True, True], [True, True]]
-    seen = [truth(of, tick, pose=pose, alive=np.array(alive)) for tick, alive in enumerate(lives)]
-    record(tmp_path / "run.rrd", of, seen)
+    moments = [truth(run, tick, pose=pose, alive=np.array(alive)) for tick, alive in enumerate(lives)]
+    record(tmp_path / "run.rrd", run, moments)
     crosses = column(tmp_path / "run.rrd", "/world/dead", "LineStrips2D:strips")
     assert {tick: len(strips) for tick, strips in crosses.items()} == {1: 2, 3: 4, 4: 0}
     for strip in crosses[1]:
         np.testing.assert_allclose(np.mean(strip, axis=0), [1.0, 2.0], atol=1e-6)
-        assert np.ptp(strip, axis=0).min() > of.groups[0].body.radius_m
+        assert np.ptp(strip, axis=0).min() > run.groups[0].body.radius_m
 
 
 def test_keys_of_plots_name_each_line_in_its_colour(tmp_path):
-    of = static(3)
+    run = static(3)
     counts = tally({Fate.RECEIVED: 2, Fate.LOST: 1})
-    record(tmp_path / "run.rrd", of, list(moving(of, 3, tally=counts)))
+    record(tmp_path / "run.rrd", run, list(moving(run, 3, tally=counts)))
     (names,) = column(tmp_path / "run.rrd", "/keys/packets", "Points2D:labels").values()
     (colors,) = column(tmp_path / "run.rrd", "/keys/packets", "Points2D:colors").values()
     assert dict(zip(names, colors, strict=True)) == {
@@ -183,9 +183,9 @@ def test_keys_of_plots_name_each_line_in_its_colour(tmp_path):
 
 
 def test_legend_counts_the_classes_it_omits_and_draws_any_letters(tmp_path):
-    of, states = static(3), ("", "\u2192 caf\u00e9", *(f"state {i}" for i in range(20)))
-    ticks = [truth(of, tick, state=np.full(3, tick + 1), states=states) for tick in range(10)]
-    record(tmp_path / "run.rrd", of, ticks)
+    run, states = static(3), ("", "\u2192 caf\u00e9", *(f"state {i}" for i in range(20)))
+    ticks = [truth(run, tick, state=np.full(3, tick + 1), states=states) for tick in range(10)]
+    record(tmp_path / "run.rrd", run, ticks)
     (legend,) = column(tmp_path / "run.rrd", "/legend", "Points2D:labels").values()
     *shown, more = legend
     assert shown == ["? caf\u00e9", "state 0", "state 1", "state 2", "state 3"]
@@ -193,7 +193,7 @@ def test_legend_counts_the_classes_it_omits_and_draws_any_letters(tmp_path):
 
 
 def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_path):
-    of = static(3, arenas=2)
+    run = static(3, arenas=2)
     own = ReceptionRecords(
         arena=np.array([0, 0, 0, 1, 0]),
         sender=np.array([0, 1, 2, 0, 0]),
@@ -204,8 +204,8 @@ def test_packets_that_ended_unheard_are_lines_in_the_colour_of_their_fate(tmp_pa
         ),
         fate=np.array([Fate.LOST, Fate.RECEIVED, Fate.BLOCKED, Fate.LOST, Fate.QUEUE_FULL]),
     )
-    first, second = moving(of, 2)
-    record(tmp_path / "run.rrd", of, [replace(first, finished=own), second])
+    first, second = moving(run, 2)
+    record(tmp_path / "run.rrd", run, [replace(first, finished=own), second])
     lines = column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:strips")
     position_m = first.pose[:3, :2].astype(np.float32)
     assert lines == {0: [position_m[[0, 1]].tolist(), position_m[[2, 0]].tolist()]}
@@ -231,40 +231,40 @@ def frames(*links, tag=FRAME_TAG):
 
 
 def test_links_that_carry_frames_of_interfaces_have_their_bytes_per_second_of_the_last_second(tmp_path):
-    of = static(3, arenas=2)
+    run = static(3, arenas=2)
     there_and_back = frames((0, 1, 300, Fate.RECEIVED), (1, 0, 200, Fate.RECEIVED), (2, 1, 900, Fate.LOST))
-    ticks = list(moving(of, of.rate_hz + 2))
+    ticks = list(moving(run, run.rate_hz + 2))
     ticks[0] = replace(ticks[0], finished=there_and_back)
-    ticks[1:] = [replace(seen, finished=frames()) for seen in ticks[1:]]
-    record(tmp_path / "run.rrd", of, ticks)
+    ticks[1:] = [replace(moment, finished=frames()) for moment in ticks[1:]]
+    record(tmp_path / "run.rrd", run, ticks)
     labels = column(tmp_path / "run.rrd", "/world/traffic", "LineStrips2D:labels")
     strips = column(tmp_path / "run.rrd", "/world/traffic", "LineStrips2D:strips")
-    assert labels[0] == [f"{500 * of.rate_hz / 1000:.1f} kB/s"]
-    assert labels[of.rate_hz - 1] == ["500 B/s"]
-    assert labels[of.rate_hz] == strips[of.rate_hz] == []
-    assert of.rate_hz + 1 not in labels
+    assert labels[0] == [f"{500 * run.rate_hz / 1000:.1f} kB/s"]
+    assert labels[run.rate_hz - 1] == ["500 B/s"]
+    assert labels[run.rate_hz] == strips[run.rate_hz] == []
+    assert run.rate_hz + 1 not in labels
     assert strips[0] == [ticks[0].pose[[0, 1], :2].astype(np.float32).tolist()]
 
 
 def test_messages_of_agents_are_no_traffic_of_interfaces(tmp_path):
-    of = static(3, arenas=2)
+    run = static(3, arenas=2)
     message = frames((0, 1, 300, Fate.RECEIVED), tag=7)
-    record(tmp_path / "run.rrd", of, [replace(seen, finished=message) for seen in moving(of, 2)])
+    record(tmp_path / "run.rrd", run, [replace(moment, finished=message) for moment in moving(run, 2)])
     assert column(tmp_path / "run.rrd", "/world/traffic", "LineStrips2D:strips") == {}
 
 
 def test_events_of_the_first_arena_are_told_and_marked_where_they_take_effect(tmp_path):
-    of = static(2, arenas=2)
+    run = static(2, arenas=2)
     kill = EventRecord(0, 0.15, "kill", False, np.array([True, True, True, False]))
-    elsewhere, here = (
+    elsewhere, local = (
         EventRecord(1, 0.2, "fail", False, np.array(changed), "motors", singly=True)
         for changed in ([False, False, True, True], [True, False, False, False])
     )
-    happened = truth(of, 1, events=(kill, elsewhere)), truth(of, 3, events=(here, elsewhere))
-    record(tmp_path / "run.rrd", of, [truth(of), happened[0], truth(of, 2), happened[1]])
-    told = column(tmp_path / "run.rrd", "/events", "TextLog:text")
-    assert "2 robots" in told[0][0]
-    assert (told[1], told[3], len(told)) == (["kill: flock-0, flock-1"], ["fail motors: flock-0"], 3)
+    happened = truth(run, 1, events=(kill, elsewhere)), truth(run, 3, events=(local, elsewhere))
+    record(tmp_path / "run.rrd", run, [truth(run), happened[0], truth(run, 2), happened[1]])
+    texts = column(tmp_path / "run.rrd", "/events", "TextLog:text")
+    assert "2 robots" in texts[0][0]
+    assert (texts[1], texts[3], len(texts)) == (["kill: flock-0, flock-1"], ["fail motors: flock-0"], 3)
     assert list(column(tmp_path / "run.rrd", "/plots/shares/event", "Scalars:scalars")) == [1, 3]
 
 
@@ -277,16 +277,16 @@ def test_recording_sends_each_entity_once_per_two_seconds(tmp_path, monkeypatch)
             name,
             lambda *args, original=original, **more: (calls.append(args[1]), original(*args, **more)),
         )
-    of, metrics, clock = static(150), Metrics(), StillClock()
+    run, metrics, clock = static(150), Metrics(), StillClock()
     recording = RerunRecording(tmp_path / "run.rrd", metrics, clock)
     for observer in (metrics, recording):
-        observer.begin(of)
+        observer.begin(run)
     sent = []
-    for seen in moving(of, 9, edges=edges((0, 1), (1, 2)), tally=tally({Fate.RECEIVED: 150})):
+    for moment in moving(run, 9, edges=edges((0, 1), (1, 2)), tally=tally({Fate.RECEIVED: 150})):
         calls.clear()
         clock.time_ns += 7 * NS_PER_S // 10
         for observer in (metrics, recording):
-            observer.see(seen)
+            observer.see(moment)
         sent.append([call for call in calls if call.startswith("world/")])
     assert [bool(names) for names in sent] == [False, False, True] * 3
     assert set(sent[5]) == set(sent[8]) >= {"world/robots", "world/headings", "world/links", "world/selected"}
@@ -308,9 +308,9 @@ def test_recording_sends_earlier_when_much_is_buffered(tmp_path, monkeypatch):
 
 
 def test_recording_is_closed_when_an_entity_fails_at_its_end(tmp_path, monkeypatch):
-    of, metrics = static(3), Metrics()
+    run, metrics = static(3), Metrics()
     recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
-    watch(of, moving(of, 4), metrics, recording)
+    watch(run, moving(run, 4), metrics, recording)
     monkeypatch.setattr(rerun.TextLog, "columns", refuse)
     recording._rows.add("events", rerun.TextLog.columns, text=["cannot be sent"])
     with pytest.raises(ValueError, match="refused"):
@@ -325,9 +325,9 @@ def test_recording_that_failed_at_its_begin_is_closed(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="refused"):
         recording.begin(static(3))
     recording.end(None)
-    state, told = check_recording(tmp_path / "run.rrd")
+    state, text = check_recording(tmp_path / "run.rrd")
     assert state is TableState.PARTIAL
-    assert "closed" not in told
+    assert "closed" not in text
 
 
 def refuse(*_, **__):
@@ -343,18 +343,18 @@ def view_names(path):
 
 @pytest.mark.parametrize(("radio", "size_m"), [(True, (8.0, 6.0)), (True, (2.0, 9.0)), (False, (8.0, 6.0))])
 def test_recording_opens_with_named_views_of_its_contents(tmp_path, radio, size_m):
-    of = replace(static(2, radio=radio), arena_size_m=size_m)
-    record(tmp_path / "run.rrd", of, moving(of, 1))
+    run = replace(static(2, radio=radio), arena_size_m=size_m)
+    record(tmp_path / "run.rrd", run, moving(run, 1))
     names = view_names(tmp_path / "run.rrd")
     assert "Selected robot" in names
     assert len(names) == (17 if radio else 11)  # each plot has a view with the names of its lines
 
 
 def test_recording_has_no_wall_clock_and_is_equal_for_equal_runs(tmp_path):
-    of = static(3, obstacles=OBSTACLES)
+    run = static(3, obstacles=OBSTACLES)
     contents = []
     for path in (tmp_path / "a.rrd", tmp_path / "b.rrd"):
-        record(path, of, moving(of, 5, edges=edges((0, 1)), tally=tally({Fate.RECEIVED: 2})))
+        record(path, run, moving(run, 5, edges=edges((0, 1)), tally=tally({Fate.RECEIVED: 2})))
         chunks = list(rerun.chunk.RrdReader(str(path)).stream())
         assert {name for chunk in chunks for name in chunk.timeline_names} == {"tick", "sim_time"}
         columns = {(chunk.entity_path, name) for chunk in chunks for name in chunk.to_record_batch().schema.names}
@@ -365,8 +365,8 @@ def test_recording_has_no_wall_clock_and_is_equal_for_equal_runs(tmp_path):
 
 
 def test_recording_without_a_radio_has_neither_links_nor_packets(tmp_path):
-    of = static(3, radio=False)
-    record(tmp_path / "run.rrd", of, moving(of, 3))
+    run = static(3, radio=False)
+    record(tmp_path / "run.rrd", run, moving(run, 3))
     assert column(tmp_path / "run.rrd", "/world/links", "LineStrips2D:strips") == {}
     assert column(tmp_path / "run.rrd", "/world/lost_packets", "LineStrips2D:strips") == {}
     assert series(tmp_path / "run.rrd", "packets") == {}
@@ -375,8 +375,8 @@ def test_recording_without_a_radio_has_neither_links_nor_packets(tmp_path):
 
 def test_obstacles_and_lights_are_drawn_once_where_they_are(tmp_path):
     triangle = Obstacle("polygon", 1.0, -1.0, np.pi / 2, points_m=((0.0, 0.0), (1.0, 0.0), (0.0, 0.5)))
-    of = static(2, obstacles=(*OBSTACLES, triangle), lights=((Light(0.5, -0.25, 2.0), Light(1.0, 1.5, 1.0)),))
-    record(tmp_path / "run.rrd", of, moving(of, 2))
+    run = static(2, obstacles=(*OBSTACLES, triangle), lights=((Light(0.5, -0.25, 2.0), Light(1.0, 1.5, 1.0)),))
+    record(tmp_path / "run.rrd", run, moving(run, 2))
     (outlines,) = column(tmp_path / "run.rrd", "/world/obstacles", "LineStrips2D:strips").values()
     assert [len(outline) for outline in outlines] == [49, 5, 4]
     assert np.allclose(outlines[2], [[1.0, -1.0], [1.0, 0.0], [0.5, -1.0], [1.0, -1.0]], atol=1e-6)
@@ -388,19 +388,19 @@ def test_obstacles_and_lights_are_drawn_once_where_they_are(tmp_path):
 
 def test_movable_obstacles_are_drawn_where_they_are_in_each_tick(tmp_path):
     pushed = Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0), mass_kg=1.0)
-    of = static(2, obstacles=(*OBSTACLES, pushed))
-    ticks = (truth(of, tick, movable=np.array([[[tick, 1.0, tick * np.pi / 2]]])) for tick in range(2))
-    record(tmp_path / "run.rrd", of, ticks)
+    run = static(2, obstacles=(*OBSTACLES, pushed))
+    ticks = (truth(run, tick, movable=np.array([[[tick, 1.0, tick * np.pi / 2]]])) for tick in range(2))
+    record(tmp_path / "run.rrd", run, ticks)
     (fixed,) = column(tmp_path / "run.rrd", "/world/obstacles", "LineStrips2D:strips").values()
     assert len(fixed) == len(OBSTACLES)
-    found = column(tmp_path / "run.rrd", "/world/movable", "LineStrips2D:strips")
-    assert np.allclose(found[0], [[[-1.0, 0.5], [1.0, 0.5], [1.0, 1.5], [-1.0, 1.5], [-1.0, 0.5]]])
-    assert np.allclose(found[1], [[[1.5, 0.0], [1.5, 2.0], [0.5, 2.0], [0.5, 0.0], [1.5, 0.0]]])
+    lines = column(tmp_path / "run.rrd", "/world/movable", "LineStrips2D:strips")
+    assert np.allclose(lines[0], [[[-1.0, 0.5], [1.0, 0.5], [1.0, 1.5], [-1.0, 1.5], [-1.0, 0.5]]])
+    assert np.allclose(lines[1], [[[1.5, 0.0], [1.5, 2.0], [0.5, 2.0], [0.5, 0.0], [1.5, 0.0]]])
 
 
 def test_floor_is_one_picture_in_a_recording(tmp_path):
-    of = replace(static(2), floor=Floor(1.0, (Patch("disc", 4.0, 3.0, 0.0, radius_m=1.0),)))
-    record(tmp_path / "run.rrd", of, moving(of, 2))
+    run = replace(static(2), floor=Floor(1.0, (Patch("disc", 4.0, 3.0, 0.0, radius_m=1.0),)))
+    record(tmp_path / "run.rrd", run, moving(run, 2))
     (buffer,) = column(tmp_path / "run.rrd", "/world/floor", "Image:buffer").values()
     grey = np.array(buffer).reshape(384, 512)
     assert (grey[0, 0], grey[-1, -1], grey.min(), grey.max()) == (90, 30, 30, 90)  # the first row is the lowest
@@ -435,11 +435,11 @@ pytest.importorskip("rerun", reason="needs the extra [view]")
 
 @pytest.fixture
 def rrd(tmp_path):
-    of, metrics = static(3), Metrics()
+    run, metrics = static(3), Metrics()
     recording = RerunRecording(tmp_path / "run.rrd", metrics, StillClock())
     x_m = np.linspace(-2, 2, 3)
     poses = (np.column_stack([x_m, np.full(3, 0.1 * tick), np.zeros(3)]) for tick in range(20))
-    watch(of, (truth(of, tick, pose=pose) for tick, pose in enumerate(poses)), metrics, recording)
+    watch(run, (truth(run, tick, pose=pose) for tick, pose in enumerate(poses)), metrics, recording)
     recording.end(None)
     return tmp_path / "run.rrd"
 

@@ -319,7 +319,7 @@ def test_example_client_drives_reads_and_stops_a_robot(gateway: Epuck2Gateway, t
     gateway.publish(0, {"scan.range_m": three([0.535])}, ALIVE)
     program = [sys.executable, CLIENT, *gateway.addresses[0].split(":")]
     with subprocess.Popen(program, stdout=subprocess.PIPE, cwd=tmp_path, text=True) as client:
-        driving = until(gateway.pop_commands, lambda taken: taken.drive[0])
+        driving = until(gateway.pop_commands, lambda commands: commands.drive[0])
         gateway.publish(1, {}, ALIVE)  # with a picture
         output, _ = client.communicate(timeout=60)
     assert driving.linear_mps[0] == pytest.approx(275 * STEP_M)
