@@ -234,13 +234,13 @@ def test_record_of_a_section_keeps_the_rows_of_others(monkeypatch: pytest.Monkey
     file = tmp_path / "ns3.json"
     file.write_text(comparison.RECORD.read_text(encoding="utf-8"), encoding="utf-8")
     monkeypatch.setattr(comparison, "RECORD", file)
-    [kept, renewed, removed] = CONFIGURATIONS[:3]
-    write_record({renewed: {"delivery": np.zeros(renewed.seeds)}}, [kept, renewed, LONE])
+    [unchanged, renewed, removed] = CONFIGURATIONS[:3]
+    write_record({renewed: {"delivery": np.zeros(renewed.seeds)}}, [unchanged, renewed, LONE])
     rows = recorded()
-    assert set(rows) == {kept, renewed}
+    assert set(rows) == {unchanged, renewed}
     assert removed not in rows
     assert rows[renewed]["delivery"].tolist() == [0.0] * renewed.seeds
-    np.testing.assert_equal(rows[kept], RECORD[kept])
+    np.testing.assert_equal(rows[unchanged], RECORD[unchanged])
 
 
 class OneAtATime(Executor):

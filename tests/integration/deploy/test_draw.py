@@ -15,7 +15,7 @@ E_PUCK_BLUE = (86, 180, 233)
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -34,22 +34,22 @@ def pixels(path):
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda path: path.stem)
-def test_scenario_drawing_exists_for_every_shipped_scenario(here, scenario):
+def test_scenario_drawing_exists_for_every_shipped_scenario(folder, scenario):
     assert draw(scenario) == f"written: {scenario.stem}.png\n"
-    image = pixels(here / f"{scenario.stem}.png")
+    image = pixels(folder / f"{scenario.stem}.png")
     assert max(image.shape) == 1280
     assert (image == E_PUCK_BLUE).all(axis=2).any()
 
 
-def test_floor_is_drawn_in_greys(here):
+def test_floor_is_drawn_in_greys(folder):
     draw(ROOT / "scenarios" / "maze.toml", "--to", "maze.png")
-    spot = (pixels(here / "maze.png") == round(255 * (0.45 + 0.55 * 0.2))).all(axis=2)
+    spot = (pixels(folder / "maze.png") == round(255 * (0.45 + 0.55 * 0.2))).all(axis=2)
     assert spot.sum() > 1000
-    (here / "half.pgm").write_text("P2 2 1 255 0 255")
+    (folder / "half.pgm").write_text("P2 2 1 255 0 255")
     arena = "arena.size_m=[2, 2]", "arena.obstacles=[]", "arena.boundary='open'", "arena.ground.image='half.pgm'"
-    (here / "own.toml").write_text((ROOT / "scenarios" / "avoidance.toml").read_text())
+    (folder / "own.toml").write_text((ROOT / "scenarios" / "avoidance.toml").read_text())
     draw("own.toml", "--to", "half.png", *(part for one in arena for part in ("--set", one)))
-    drawn = pixels(here / "half.png")
+    drawn = pixels(folder / "half.png")
     black, white = ((drawn == round(255 * bright)).all(axis=2) for bright in (0.45, 1.0))
     left, right = np.flatnonzero(black.sum(axis=0) > 100)[[0, -1]]
     assert white[:, right + 20].sum() > 100  # the right half, as bright as the page
@@ -57,31 +57,31 @@ def test_floor_is_drawn_in_greys(here):
     assert right - left == pytest.approx(black.sum(axis=0).max() / 2, abs=20)
 
 
-def test_another_seed_or_setting_is_another_picture(here):
+def test_another_seed_or_setting_is_another_picture(folder):
     draw(LOSSY, "--to", "a.png")
     draw(LOSSY, "--to", "b.png", "--seed", "2")
     draw(LOSSY, "--to", "c.png", "--set", "radio.range_m=1")
     draw(LOSSY, "--to", "d.png")
-    a, b, c, d = (pixels(here / f"{name}.png") for name in "abcd")
+    a, b, c, d = (pixels(folder / f"{name}.png") for name in "abcd")
     assert (a == d).all()
     assert (a != b).any()
     assert (a != c).any()
 
 
-def test_bodies_are_drawn_by_name_and_by_data_sheet(here):
+def test_bodies_are_drawn_by_name_and_by_data_sheet(folder):
     assert draw("epuck") == "written: epuck.png\n"
-    (here / "wide.toml").write_text('like = "epuck"\nname = "wide"\nsource = "a test"\nradius_m = 0.05\n')
+    (folder / "wide.toml").write_text('like = "epuck"\nname = "wide"\nsource = "a test"\nradius_m = 0.05\n')
     assert draw("wide.toml") == "written: wide.png\n"
-    assert pixels(here / "wide.png").shape[1] == 900
+    assert pixels(folder / "wide.png").shape[1] == 900
 
 
-def test_drawing_may_be_svg(here):
+def test_drawing_may_be_svg(folder):
     draw("footbot", "--to", "a.svg")
-    assert "</svg>" in (here / "a.svg").read_text()
+    assert "</svg>" in (folder / "a.svg").read_text()
 
 
 @pytest.mark.parametrize(
-    ("arguments", "place", "expected"),
+    ("arguments", "where", "expected"),
     [
         (["blimp"], "blimp", ", ".join(body_names())),
         (["absent.toml"], "absent.toml", "file"),
@@ -93,10 +93,10 @@ def test_drawing_may_be_svg(here):
         (["thin.toml"], "thin.toml: radius_m", "-1.0"),
     ],
 )
-def test_draw_arguments_that_are_invalid_are_refused(here, arguments, place, expected):
-    (here / "thin.toml").write_text('like = "epuck"\nradius_m = -1\n')
+def test_draw_arguments_that_are_invalid_are_refused(folder, arguments, where, expected):
+    (folder / "thin.toml").write_text('like = "epuck"\nradius_m = -1\n')
     with pytest.raises(BadInput) as error:
         draw(*arguments)
-    assert ": ".join(filter(None, (error.value.where, error.value.key))) == place
+    assert ": ".join(filter(None, (error.value.where, error.value.key))) == where
     assert expected in error.value.expected
-    assert not [*here.glob("*.png"), *here.glob("*.bmp")]
+    assert not [*folder.glob("*.png"), *folder.glob("*.bmp")]

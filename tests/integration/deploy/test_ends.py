@@ -70,8 +70,8 @@ def test_process_names_of_agents_are_their_robots_and_status_has_the_pid(tmp_pat
     with started(LOSSY, "--runners", runners, *swarm, "--out", tmp_path / "run") as process:
         try:
             assert {psutil.Process(runner.pid).name() for runner in runners_of(process)} == names
-            told = swarmwire("ctl", "--run", tmp_path / "run", "status", "--json")
-            assert json.loads(told.stdout)["pid"] == process.pid
+            status = swarmwire("ctl", "--run", tmp_path / "run", "status", "--json")
+            assert json.loads(status.stdout)["pid"] == process.pid
         finally:
             process.kill()
 
@@ -82,9 +82,9 @@ def long_run(tmp_path):
     children = family(process)
     assert len(children) == 6  # an agent host, its fork server and four agent processes
     yield process, children
-    for left in [*children, psutil.Process(process.pid)] if process.poll() is None else children:
-        if left.is_running():
-            left.kill()
+    for survivor in [*children, psutil.Process(process.pid)] if process.poll() is None else children:
+        if survivor.is_running():
+            survivor.kill()
     process.communicate()
 
 
@@ -104,7 +104,7 @@ def kill_agent_host(process: subprocess.Popen[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("act", "code", "said", "ended"),
+    ("act", "code", "text", "ended"),
     [
         (lambda process: runners_of(process)[2].kill(), 1, "was lost", "failed"),
         (kill_agent_host, 1, "was lost", "failed"),
@@ -113,15 +113,15 @@ def kill_agent_host(process: subprocess.Popen[str]) -> None:
     ids=["a runner is killed", "the agent host and all runners are", "Ctrl-C"],
 )
 def test_run_that_is_killed_or_interrupted_ends_with_summary_and_whole_records(
-    long_run, tmp_path, act: Act, code, said, ended
+    long_run, tmp_path, act: Act, code, text, ended
 ):
     process, children = long_run
     act(process)
     output, errors = process.communicate(timeout=GONE_S + 5)
     assert process.returncode == code
     assert code != 130 or ("interrupted" in output and "4 processes, lockstep" in output)
-    assert said in errors
-    assert ("flock-" in errors, errors == "") == (bool(said), not said)
+    assert text in errors
+    assert ("flock-" in errors, errors == "") == (bool(text), not text)
     assert "Traceback" not in errors
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert (summary["ended"], summary["ticks"] < 36_000) == (ended, True)
@@ -158,7 +158,7 @@ def test_interrupt_ends_a_run_that_waits_for_an_agent(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def complete(tmp_path_factory):
     """The same run, not killed."""
     folder = tmp_path_factory.mktemp("whole")
     record_run(folder, overrides=[DURATION, KILL])
@@ -166,7 +166,7 @@ def whole(tmp_path_factory):
 
 
 @pytest.mark.parametrize("moment", MOMENTS)
-def test_killed_run_leaves_a_readable_and_true_folder(tmp_path, whole, moment):
+def test_killed_run_leaves_a_readable_and_true_folder(tmp_path, complete, moment):
     process = started_in_haste(tmp_path, DURATION, KILL)
     with process:
         assert process.stdout is not None
@@ -174,19 +174,19 @@ def test_killed_run_leaves_a_readable_and_true_folder(tmp_path, whole, moment):
         process.kill()
     folder = RunFolder(tmp_path)
     assert folder.summary is None
-    assert folder.static == whole.static
+    assert folder.static == complete.static
     findings = {finding.part: finding for finding in verify(tmp_path)}
     for name in ("ticks", "packets", "events"):
         assert findings[name].state in (TableState.PARTIAL, TableState.INTACT), findings[name]
         parts = parts_of(tmp_path, name)
         assert parts == [part_file(tmp_path, name, number) for number in range(len(parts))] or folder.files(name)
         if folder.files(name) or name != "ticks":
-            left = getattr(folder, name)()
-            assert left.equals(getattr(whole, name)().head(len(left)))
+            table = getattr(folder, name)()
+            assert table.equals(getattr(complete, name)().head(len(table)))
     if folder.files("ticks"):
         ticks = folder.ticks(0)["tick"].to_list()
         assert ticks == list(range(len(ticks)))
-        assert len(folder.robots()) == len(ticks) * whole.static.robots
+        assert len(folder.robots()) == len(ticks) * complete.static.robots
 
 
 @pytest.fixture(scope="module")
@@ -194,27 +194,27 @@ def killed(tmp_path_factory):
     """A long run's folder, killed amid its ticks; a tick that was over some periods before, and the last that was."""
     folder, clock = tmp_path_factory.mktemp("killed"), WallClock()
     process = started_in_haste(folder, "duration_s=3600", rrd=find_spec("rerun") is not None)
-    before, due_ns, seen = None, 0, list[int]()
+    before, due_ns, numbers = None, 0, list[int]()
     with process:
         assert process.stdout is not None
         ticks = (int(line) for line in process.stdout if line.strip().isdecimal())
         for tick in ticks:
-            seen.append(tick)
+            numbers.append(tick)
             if before is None and len(parts_of(folder, "ticks")) >= 3:
                 before, due_ns = tick, clock.now_ns() + SOME_PERIODS_NS
             if before is not None and clock.now_ns() >= due_ns:
                 break
         process.kill()
-        return folder, before, max(*seen, *ticks)
+        return folder, before, max(*numbers, *ticks)
 
 
 def test_killed_run_leaves_its_recording_up_to_the_last_period(killed):
     pytest.importorskip("rerun", reason="needs the extra [view]")
     folder, before, last = killed
-    state, told = check_recording(folder / "run.rrd")
+    state, text = check_recording(folder / "run.rrd")
     assert state is TableState.PARTIAL
-    reach = re.search(r"readable up to tick (\d+); it was never closed$", told)
-    assert reach, told
+    reach = re.search(r"readable up to tick (\d+); it was never closed$", text)
+    assert reach, text
     assert before <= int(reach[1]) <= last + 1  # the recorder sees a tick before it is printed
 
 

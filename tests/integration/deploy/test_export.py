@@ -97,24 +97,24 @@ def test_picture_is_of_the_end_unless_a_time_is_given(run, tmp_path):
 
 
 def test_table_export_holds_the_metrics_over_time(run, tmp_path):
-    of, to = film(ticks=30), tmp_path / "metrics.csv"
+    recorded, to = film(ticks=30), tmp_path / "metrics.csv"
     assert export(run, "--to", to) == f"written: {to} (30 rows)\n"
     table = pl.read_csv(to)
     assert table.columns == ["time_s", *film_of(Folder(run), 0, "run").metrics]
-    assert table["time_s"].to_list() == of.time_s.tolist()
-    np.testing.assert_array_equal(table["order"].cast(float).to_numpy(), of.metrics["order"])
+    assert table["time_s"].to_list() == recorded.time_s.tolist()
+    np.testing.assert_array_equal(table["order"].cast(float).to_numpy(), recorded.metrics["order"])
     export(run, "--to", to, "--metric", "order", "--from", "1", "--until", "2")
     part = pl.read_csv(to)
     assert part.columns == ["time_s", "order"]
-    assert part["time_s"].to_list() == [at_s for at_s in of.time_s.tolist() if 1.0 <= at_s <= 2.0]
+    assert part["time_s"].to_list() == [at_s for at_s in recorded.time_s.tolist() if 1.0 <= at_s <= 2.0]
 
 
 def test_gif_lasts_as_long_as_the_run_and_prints_its_frames(run):
     from PIL import Image
 
-    told = export(run, "--to", run / "film.gif", *SMALL)
-    assert told.splitlines()[0] == "30 frames, 10 a second, 1 x real time"
-    assert told.splitlines()[1].startswith(f"written: {run}/film.gif (")
+    output = export(run, "--to", run / "film.gif", *SMALL)
+    assert output.splitlines()[0] == "30 frames, 10 a second, 1 x real time"
+    assert output.splitlines()[1].startswith(f"written: {run}/film.gif (")
     with Image.open(run / "film.gif") as gif:
         assert gif.n_frames == 30
         assert gif.info["duration"] == 100
@@ -124,8 +124,8 @@ def test_mp4_is_of_the_given_time_and_speed(run, tmp_path):
     import imageio_ffmpeg
 
     to = tmp_path / "a.mp4"
-    told = export(run, "--to", to, "--from", "1", "--until", "2", "--fps", "5", "--speed", "0.5", *SMALL)
-    assert told.splitlines()[0] == "11 frames, 5 a second, 0.5 x real time"
+    output = export(run, "--to", to, "--from", "1", "--until", "2", "--fps", "5", "--speed", "0.5", *SMALL)
+    assert output.splitlines()[0] == "11 frames, 5 a second, 0.5 x real time"
     assert imageio_ffmpeg.count_frames_and_secs(str(to)) == (11, pytest.approx(2.2))
 
 
@@ -139,8 +139,8 @@ def test_mp4_without_the_encoder_is_refused_before_a_frame_is_drawn(run, monkeyp
 def test_export_of_a_killed_run_reaches_to_its_last_part(run):
     from PIL import Image
 
-    whole = run / "ticks.parquet"
-    whole.unlink()
+    path = run / "ticks.parquet"
+    path.unlink()
     (run / "ticks").mkdir()
     ticks_frame(film(ticks=12)).write_parquet(run / "ticks" / "part-0.parquet")
     export(run, "--to", run / "film.gif", *SMALL)
@@ -149,7 +149,7 @@ def test_export_of_a_killed_run_reaches_to_its_last_part(run):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "place", "expected"),
+    ("arguments", "where", "expected"),
     [
         (["--at", "7"], "--at", "0 to 2.9 s"),
         (["--at", "nan"], "--at", "0 to 2.9 s"),
@@ -166,11 +166,11 @@ def test_export_of_a_killed_run_reaches_to_its_last_part(run):
         (["--to", "a.gif", "--size", "5"], "--size", "100 to 8000 pixels"),
     ],
 )
-def test_export_options_that_are_invalid_are_refused(run, monkeypatch, arguments, place, expected):
+def test_export_options_that_are_invalid_are_refused(run, monkeypatch, arguments, where, expected):
     monkeypatch.chdir(run)
     with pytest.raises(BadInput) as error:
         export(run, *arguments)
-    assert ": ".join(filter(None, (error.value.where, error.value.key))) == place.replace("RUN", str(run))
+    assert ": ".join(filter(None, (error.value.where, error.value.key))) == where.replace("RUN", str(run))
     assert expected in error.value.expected
     assert [path.name for path in run.iterdir()] == ["ticks.parquet"]
 
@@ -265,48 +265,48 @@ def test_motion_options_that_do_not_fit_are_refused(folders, tmp_path, monkeypat
 def exported(folder: Path, to: Path, *options: str) -> Capture:
     ended = CliRunner().invoke(app, ["export", str(folder), "--to", str(to), *options], catch_exceptions=False)
     assert ended.exit_code == 0, ended.output
-    found, radio = read(to), json.loads((folder / "summary.json").read_text())["radio"]
+    capture, radio = read(to), json.loads((folder / "summary.json").read_text())["radio"]
     count = radio["fates"].get("in_flight", 0)
     more = f"; {count} receptions were in flight at the end" if count else ""
-    assert f"({len(found.packets)} frames{more})" in " ".join(ended.output.split())
-    return found
+    assert f"({len(capture.packets)} frames{more})" in " ".join(ended.output.split())
+    return capture
 
 
 @pytest.mark.parametrize("preset", HEADERS)
 def test_capture_holds_each_packet_on_air_once_with_headers_and_payload(folders, tmp_path, preset):
-    found, packets = exported(folders[preset], tmp_path / "t.pcapng"), RunFolder(folders[preset]).packets()
+    capture, packets = exported(folders[preset], tmp_path / "t.pcapng"), RunFolder(folders[preset]).packets()
     link_type, header_bytes = HEADERS[preset]
     on_air = packets.drop_nulls("receiver").unique(["sender", "sequence"]).sort("on_air_at_ns", "sender", "sequence")
-    assert found.link_type == link_type
-    assert len(found.packets) > 20
-    assert [one.at_ns for one in found.packets] == on_air["on_air_at_ns"].to_list()
-    assert [one.data[header_bytes:] for one in found.packets] == on_air["payload"].to_list()
-    assert all(one.length == len(one.data) == header_bytes + 6 for one in found.packets)
-    comments = [comment for one in found.packets for comment in one.comments]
+    assert capture.link_type == link_type
+    assert len(capture.packets) > 20
+    assert [one.at_ns for one in capture.packets] == on_air["on_air_at_ns"].to_list()
+    assert [one.data[header_bytes:] for one in capture.packets] == on_air["payload"].to_list()
+    assert all(one.length == len(one.data) == header_bytes + 6 for one in capture.packets)
+    comments = [comment for one in capture.packets for comment in one.comments]
     assert sum(comment.startswith("received: ") for comment in comments) > 20
     assert comments[0].endswith("to all: Heading, packet 0")
 
 
 def test_capture_can_be_of_a_part_of_the_run(folders, tmp_path):
-    whole = exported(folders["ieee802154"], tmp_path / "whole.pcapng")
+    capture = exported(folders["ieee802154"], tmp_path / "whole.pcapng")
     part = exported(folders["ieee802154"], tmp_path / "part.pcapng", "--from", "0.1", "--until", "0.3")
-    kept = [one for one in whole.packets if 100_000_000 <= one.at_ns < 300_000_000]
-    assert part.packets == kept
-    assert 0 < len(kept) < len(whole.packets)
+    packets = [one for one in capture.packets if 100_000_000 <= one.at_ns < 300_000_000]
+    assert part.packets == packets
+    assert 0 < len(packets) < len(capture.packets)
 
 
 @pytest.mark.skipif(shutil.which("tshark") is None, reason="needs tshark")
 @pytest.mark.parametrize("preset", HEADERS)
 def test_tshark_reads_every_frame_and_finds_no_fault(folders, tmp_path, preset):
     to = tmp_path / "t.pcapng"
-    found = exported(folders[preset], to)
+    capture = exported(folders[preset], to)
     fields = ["_ws.malformed", "frame.time_epoch", *FIELDS[preset]]
     command = ["tshark", "-r", str(to), "-T", "fields", *(part for name in fields for part in ("-e", name))]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     rows = [line.split("\t") for line in ended.stdout.splitlines()]
-    assert len(rows) == len(found.packets)
+    assert len(rows) == len(capture.packets)
     assert {row[0] for row in rows} == {""}
-    assert [row[1] for row in rows] == [f"0.{one.at_ns:09d}" for one in found.packets]
+    assert [row[1] for row in rows] == [f"0.{one.at_ns:09d}" for one in capture.packets]
     assert rows[0][-len(FIRST[preset]) :] == FIRST[preset]
 
 
@@ -331,9 +331,9 @@ def test_damaged_packets_are_refused_with_file_and_fault_and_verify_finds_them(f
     with pytest.raises(BadInput, match=rf"packets\.parquet: .*{text}"):
         exported(folder, tmp_path / "t.pcapng")
     assert not (tmp_path / "t.pcapng").exists()
-    (found,) = (finding for finding in verify(folder) if finding.part == "packets")
-    assert found.state is TableState.DAMAGED
-    assert re.search(text, found.text)
+    (packets_finding,) = (finding for finding in verify(folder) if finding.part == "packets")
+    assert packets_finding.state is TableState.DAMAGED
+    assert re.search(text, packets_finding.text)
 
 
 def test_capture_of_a_run_without_packets_is_refused_with_the_remedy(tmp_path):

@@ -28,9 +28,9 @@ def move(robots: int) -> When:
     return lambda _, truth: len(moving(truth)) == robots
 
 
-def after(what: str, ticks: int) -> When:
+def after(change: str, ticks: int) -> When:
     """Some ticks after this was told."""
-    return lambda joiners, truth: (tick := joiners.tick_of(what)) is not None and truth.tick > tick + ticks
+    return lambda joiners, truth: (tick := joiners.tick_of(change)) is not None and truth.tick > tick + ticks
 
 
 def ended(name: str) -> When:
@@ -47,7 +47,7 @@ class Case:
 
     on_loss: str
     first: tuple[str, ...]
-    told: str  # after those who joined before the first tick
+    changes: str  # after those who joined before the first tick
     steps: tuple[tuple[When, str], ...] = ()
     upon: Mapping[str, str] = field(default_factory=dict)
     settings: tuple[str, ...] = (LONG,)
@@ -57,7 +57,7 @@ class Case:
     before: tuple[str, ...] = ()  # what starts the runners
     over: str = "interrupted"
     counts: Mapping[str, int] = field(default_factory=dict)
-    reason: str = ""  # of the first change of `told`
+    reason: str = ""  # of the first change of `changes`
     ends: Mapping[str, tuple[int, str]] = field(default_factory=dict)  # exit code and last line, by runner
     stopped: range = range(0)  # robots that the watchdog stopped, at least
     same: bool = False  # as with all agents in one process
@@ -72,7 +72,7 @@ CASES = {
         first=("a --robots 8", "b --robots 12"),
         steps=((at(11), "SIGKILL a"),),
         upon={"lost a": "start a"},
-        told="lost a, returned a",
+        changes="lost a, returned a",
         settings=(SHORT,),
         over="duration",
         counts={"runners_lost": 1, "runners_returned": 1},
@@ -85,7 +85,7 @@ CASES = {
         first=("a --robots 5",),
         start_with=5,
         steps=((at(5), "start b --robots 4"), (move(9), "SIGINT b"), (move(5), "quit")),
-        told="joined b, left b",
+        changes="joined b, left b",
         counts={"runners_joined_late": 1, "runners_left": 1},
         ends={"b": LEFT},
     ),
@@ -94,7 +94,7 @@ CASES = {
         first=("a --robots 5", "b --robots 15"),
         settings=(LONG, "run.runner_timeout_s=1"),
         steps=FROZEN,
-        told="lost a",
+        changes="lost a",
         counts={"runners_lost": 1},
         reason=NO_ANSWER,
         ends={"a": (1, f"the world removed the runner: {NO_ANSWER}")},
@@ -104,7 +104,7 @@ CASES = {
         before=("sh", "-c", "trap '' INT; exec \"$@\"", "sh"),
         first=("a",),
         steps=((at(4), "SIGTERM a"),),
-        told="",
+        changes="",
         over="left",
         ends={"a": LEFT},
         repeats=False,
@@ -116,7 +116,7 @@ CASES = {
         first=("a --robots 5",),
         start_with=5,
         steps=((move(5), "start b --robots 4"), (move(9), "SIGINT b"), (move(5), "quit")),
-        told="joined b, left b",
+        changes="joined b, left b",
         settings=(LONG, "run.watchdog_s=1000"),
         counts={"runners_joined_late": 1, "runners_left": 1},
         ends={"b": LEFT},
@@ -131,7 +131,7 @@ CASES = {
             (after("lost a", 5), "SIGCONT a"),
             (ended("a"), "quit"),
         ),
-        told="lost a",
+        changes="lost a",
         settings=(LONG, "run.watchdog_s=0.5", "run.runner_timeout_s=1"),
         counts={"runners_lost": 1},
         reason=NO_ANSWER,
@@ -143,22 +143,22 @@ CASES = {
 
 @pytest.fixture
 def joiners(tmp_path) -> Iterator[Joiners]:
-    found = Joiners(tmp_path)
-    yield found
-    found.close()
+    runners = Joiners(tmp_path)
+    yield runners
+    runners.close()
 
 
 def do(joiners: Joiners, line: str) -> None:
     """One line of a case."""
-    what, *words = line.split() or [""]
-    if what == "start":
+    action, *words = line.split() or [""]
+    if action == "start":
         if words[0] in joiners.processes:  # which was killed
             joiners.said(words[0])
         joiners.start(words[0], *words[1:])
-    elif what == "quit":
+    elif action == "quit":
         interrupt()
-    elif what:
-        joiners.send(words[0], signal.Signals[what])
+    elif action:
+        joiners.send(words[0], signal.Signals[action])
 
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
@@ -181,23 +181,26 @@ def test_runners_that_join_leave_or_are_lost_change_a_run_as_stated(joiners, tmp
     )
     assert not watcher.steps
     first = [f"joined {line.split()[0]}" for line in case.first]
-    assert [" ".join(told) for told in joiners.told] == [*first, *(case.told.split(", ") if case.told else [])]
+    assert [" ".join(change) for change in joiners.told] == [
+        *first,
+        *(case.changes.split(", ") if case.changes else []),
+    ]
     assert all(change.tick == -1 for change in result.runner_events[: len(first)])
     assert not case.reason or result.runner_events[len(first)].reason == case.reason
     assert result.ended == case.over
     assert result.mode == ("realtime" if case.realtime else "lockstep")
-    told = {name: count for name, count in result.counts.items() if name.startswith("runners_")}
-    assert told == (case.counts or told)
-    assert (len(result.lost_runners) == 0) == ("lost" not in case.told)
+    counts = {name: count for name, count in result.counts.items() if name.startswith("runners_")}
+    assert counts == (case.counts or counts)
+    assert (len(result.lost_runners) == 0) == ("lost" not in case.changes)
     for name, (code, last) in case.ends.items():
-        exit_code, said = joiners.said(name)
-        assert (exit_code, said.splitlines()[-1]) == (code, last)
-        assert said.splitlines()[0].startswith(f"{name}: joined run ")
+        exit_code, output = joiners.said(name)
+        assert (exit_code, output.splitlines()[-1]) == (code, last)
+        assert output.splitlines()[0].startswith(f"{name}: joined run ")
     stops = result.realtime.watchdog_stops.keys() if result.realtime else set[str]()
     assert {f"flock-{row}" for row in case.stopped} <= stops
     if case.same:
         assert result.trajectory_sha256 == alone(joiners, *settings)
-    assert (result.inputs is None) == (not case.told)  # all follows from scenario and seed
+    assert (result.inputs is None) == (not case.changes)  # all follows from scenario and seed
     if case.repeats:
         repetition = repeat(tmp_path / "run")
         assert repetition.same
@@ -222,8 +225,8 @@ def test_runner_that_may_not_join_is_told_why_at_both_ends(joiners, tmp_path):
 
     def others(_: object) -> None:
         joiners.on_change = lambda _: None
-        for name, (asked, _) in refused.items():
-            joiners.start(name, *asked, label=f"refused {name}")
+        for name, (options, _) in refused.items():
+            joiners.start(name, *options, label=f"refused {name}")
 
     def after(runner: str, why: str) -> None:
         joiners.refusals.append((runner, why))
@@ -233,9 +236,9 @@ def test_runner_that_may_not_join_is_told_why_at_both_ends(joiners, tmp_path):
     joiners.on_change, joiners.refused = others, after
     result = joiners.run(SHORT)
     for name, (_, why) in refused.items():
-        code, said = joiners.said(f"refused {name}")
+        code, output = joiners.said(f"refused {name}")
         assert code == 1
-        assert said.splitlines()[-1].startswith(f"runner {name} got no robots: {why}")
+        assert output.splitlines()[-1].startswith(f"runner {name} got no robots: {why}")
         assert any(runner == name and text.startswith(why) for runner, text in joiners.refusals)
     assert result.counts["refused_join"] == len(refused)
     assert result.trajectory_sha256 == alone(joiners, SHORT)

@@ -34,7 +34,7 @@ def test_kernels_of_another_machine_leave_nothing_to_compile(tmp_path):
     swarmwire("first", "kernels", "build", "swarm")
     swarmwire("first", "kernels", "export", "kernels.zip")
     swarmwire("second", "kernels", "import", "kernels.zip")
-    taken = set((tmp_path / "second").rglob("*.nbc"))
+    kernels = set((tmp_path / "second").rglob("*.nbc"))
     printed = swarmwire("second", "run", "swarm", "--set", "duration_s=2", "--out", "run")
     assert "written: run" in printed
-    assert set((tmp_path / "second").rglob("*.nbc")) == taken
+    assert set((tmp_path / "second").rglob("*.nbc")) == kernels

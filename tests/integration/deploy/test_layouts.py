@@ -152,10 +152,10 @@ def values(
     agents: Path, kind: str, runners: int | None, seeds: list[int], out: Path | None = None
 ) -> list[FloatArray | None]:
     """The numbers that agents of this kind note, by tick."""
-    kept = Kept()
+    observer = Kept()
     setting = [f"robots.flock.agent={agents}:{kind}", "robots.flock.params={}", "duration_s=3"]
-    run_spread(LOSSY, runners, seeds=seeds, overrides=setting, observers=[kept], out=out, record=LEAN)
-    return kept.values
+    run_spread(LOSSY, runners, seeds=seeds, overrides=setting, observers=[observer], out=out, record=LEAN)
+    return observer.values
 
 
 def as_bytes(ticks: list[FloatArray | None]) -> list[bytes | None]:
@@ -175,14 +175,14 @@ def test_noted_values_are_the_same_in_every_layout_bit_for_bit(agents: Path, kin
 
 def test_noted_values_are_recorded_from_the_first_on_and_repeated(agents: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    seen = values(agents, "Turning", 2, [2, 3], folder)
+    numbers = values(agents, "Turning", 2, [2, 3], folder)
     assert all(finding.good for finding in verify(folder)), verify(folder)
     table = RunFolder(folder).ticks(1)
     expected = [
         [None] * 20 if value is None else [None if np.isnan(one) else one for one in value[20:].tolist()]
-        for value in seen
+        for value in numbers
     ]
     assert table["value"].to_list() == expected
-    assert seen[0] is None
+    assert numbers[0] is None
     assert repeat(folder, out=tmp_path / "again", record=LEAN).same
     assert RunFolder(tmp_path / "again").ticks(1)["value"].to_list() == expected

@@ -131,8 +131,8 @@ class Stops:
 
     def done(self) -> BoolArray | None:
         self._done += 1
-        found = self._done >= self._ticks
-        return found if found.any() else None
+        over = self._done >= self._ticks
+        return over if over.any() else None
 
 
 def judged(simulation: Simulation, over: Mapping[int, int] = OVER) -> Result:
@@ -166,13 +166,13 @@ def came_to(result: Result, seed: int) -> tuple[ArenaResult, list[tuple[Any, ...
     """All that is told of an arena but how it ended, and what happened in it."""
     at = [arena.seed for arena in result.arenas].index(seed)
     arena = result.arenas[at]
-    seen = [event for event in result.events if event.tick < arena.ticks]
-    told = [
+    events = [event for event in result.events if event.tick < arena.ticks]
+    facts = [
         (event.at_s, event.tick, event.do, event.part, event.ended, event.robots[at])
-        for event in seen
+        for event in events
         if event.robots[at] or not event.singly
     ]
-    return replace(arena, ended=""), told
+    return replace(arena, ended=""), facts
 
 
 @pytest.mark.parametrize("name", WORLDS)
@@ -208,11 +208,11 @@ def test_worlds_with_arenas_that_leave_have_packets_and_faults_to_lose(tmp_path:
 
 def test_arenas_leave_alike_through_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = scenario(tmp_path, "signal")
-    here = packed(path, SEEDS[:3])
+    direct = packed(path, SEEDS[:3])
     monkeypatch.setattr(backends, "LocalBackend", EncodedBackend)
-    there = packed(path, SEEDS[:3])
-    assert there.arenas == here.arenas
-    assert there.counts == here.counts
+    encoded = packed(path, SEEDS[:3])
+    assert encoded.arenas == direct.arenas
+    assert encoded.counts == direct.counts
 
 
 class Looks(Observer):
@@ -246,7 +246,7 @@ def test_robots_of_an_arena_that_left_neither_live_move_nor_send(tmp_path: Path)
         assert departed is not None
         assert (edges >= 7).all()
         assert tally.intended[0] == tally.fates[0].sum() == 0
-        assert all((told.arena > 0).all() for told in (finished, departed))
+        assert all((packets.arena > 0).all() for packets in (finished, departed))
         assert not any(event.changed[rows].any() for event in truth.events)
 
 
@@ -259,10 +259,10 @@ def test_metrics_of_an_arena_that_leaves_are_those_of_it_alone(tmp_path: Path) -
 
 
 def test_record_of_an_arena_that_leaves_is_that_of_it_alone(tmp_path: Path) -> None:
-    path, what = scenario(tmp_path, "unit-disk"), Recording(packets=1.0, links=True, rrd=False)
-    packed(path, (3, 5, 1), out=tmp_path / "together", record=what)
+    path, recording = scenario(tmp_path, "unit-disk"), Recording(packets=1.0, links=True, rrd=False)
+    packed(path, (3, 5, 1), out=tmp_path / "together", record=recording)
     for at, seed in ((0, 3), (2, 1)):
-        alone(path, seed, out=tmp_path / f"{seed}", record=what)
+        alone(path, seed, out=tmp_path / f"{seed}", record=recording)
         for name in ("ticks", "packets", "events", "radio_robots", "radio_distances", "radio_links"):
             own = pl.read_parquet(tmp_path / f"{seed}" / f"{name}.parquet").drop("arena")
             table = pl.read_parquet(tmp_path / "together" / f"{name}.parquet").filter(arena=at).drop("arena")

@@ -89,23 +89,23 @@ def assert_names(error, path):
 
 
 def test_run_on_a_full_disk_goes_on_and_its_folder_is_readable(tmp_path):
-    disk, left = tmp_path / "disk", tmp_path / "left"
+    disk, copy = tmp_path / "disk", tmp_path / "left"
     disk.mkdir()
     if shutil.which("unshare") is None:
         pytest.skip("mount namespaces: there is no unshare")
     command = [sys.executable, "-m", "swarmwire.deploy", "run", LOSSY, "--set", "duration_s=4", "--out", disk / "run"]
-    run = ["unshare", "--mount", "sh", "-c", IN_SMALL, disk, left, *command]
-    told = subprocess.run(list(map(str, run)), capture_output=True, text=True, timeout=100, check=False)
-    if not left.exists():
-        pytest.skip(f"mount namespaces: {told.stderr.strip()}")
-    assert told.returncode == 1
-    *before, last = told.stderr.splitlines()
+    run = ["unshare", "--mount", "sh", "-c", IN_SMALL, disk, copy, *command]
+    done = subprocess.run(list(map(str, run)), capture_output=True, text=True, timeout=100, check=False)
+    if not copy.exists():
+        pytest.skip(f"mount namespaces: {done.stderr.strip()}")
+    assert done.returncode == 1
+    *before, last = done.stderr.splitlines()
     assert_names(last, disk / "run" / "summary.json")
     assert before
     assert all(line.startswith("observer ") for line in before)
-    assert "4 s in" in told.stdout
-    assert "observer_failed_TickRecorder" in told.stdout
-    states = {finding.part: finding.state for finding in verify(left)}
+    assert "4 s in" in done.stdout
+    assert "observer_failed_TickRecorder" in done.stdout
+    states = {finding.part: finding.state for finding in verify(copy)}
     assert states["static.json"] is states["run.json"] is states["log.txt"] is TableState.INTACT
     assert TableState.DAMAGED not in states.values()
 
@@ -131,13 +131,13 @@ def test_film_on_a_full_disk_is_refused_in_one_line(tmp_path):
     script = 'mount -t tmpfs -o size=4k none "$0" || exit 99; "$@"'
     export = [sys.executable, "-m", "swarmwire.deploy", "export", tmp_path / "run", "--to", disk / "film.mp4"]
     command = ["unshare", "--mount", "sh", "-c", script, disk, *export]
-    told = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=100, check=False)
-    if told.returncode == 99:
-        pytest.skip(f"mount namespaces: {told.stderr.strip()}")
-    assert told.returncode == 2
-    assert told.stderr.startswith(f"error: {disk}/film.mp4: ")
-    assert NO_ROOM in told.stderr
-    assert len(told.stderr.splitlines()) == 1
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=100, check=False)
+    if done.returncode == 99:
+        pytest.skip(f"mount namespaces: {done.stderr.strip()}")
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"error: {disk}/film.mp4: ")
+    assert NO_ROOM in done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 @pytest.mark.parametrize(
@@ -147,11 +147,11 @@ def test_too_few_addresses_are_one_line_and_nothing_begins(tmp_path, limit_kb, e
     limited = f'ulimit -v {limit_kb}; exec "$0" "$@"'
     swarmwire = [sys.executable, "-m", "swarmwire.deploy", "run", LOSSY, *SHORT, "--out", tmp_path / "run"]
     command = ["sh", "-c", limited, *map(str, swarmwire)]
-    told = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
-    assert told.returncode in (1, 2)
-    assert expected in told.stderr
-    assert "ulimit -v" in told.stderr
-    assert len(told.stderr.splitlines()) == 1
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    assert done.returncode in (1, 2)
+    assert expected in done.stderr
+    assert "ulimit -v" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
     assert not (tmp_path / "run").exists()
 
 
@@ -194,11 +194,11 @@ def test_open_files_too_few_for_all_runners_stop_a_run_before_it_begins(tmp_path
     few = "import resource, sys; resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64)); "
     call = "from swarmwire.deploy.cli.app import main; sys.argv[0] = 'swarmwire'; main()"
     command = [sys.executable, "-c", few + call, "run", LOSSY, "--runners", "per-robot", "--out", tmp_path / "run"]
-    told = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=100, check=False)
-    assert told.returncode == 2
-    (line,) = told.stderr.splitlines()
-    for said in ("error: this machine: ", f"at least {WORLD_FILES + 20} open files", "got 64 ", "ulimit -n"):
-        assert said in line
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=100, check=False)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    for text in ("error: this machine: ", f"at least {WORLD_FILES + 20} open files", "got 64 ", "ulimit -n"):
+        assert text in line
     assert not (tmp_path / "run").exists()
 
 
@@ -214,8 +214,8 @@ def test_threads_too_few_for_all_runners_stop_a_run_before_it_begins(tmp_path, m
     code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--runners", "10", "--out", tmp_path / "run")
     assert code == 2
     assert errors.startswith("error: this machine: ")
-    for said in ("for 10 runners", f"got {WORLD_THREADS} ", "ulimit -u"):
-        assert said in errors
+    for text in ("for 10 runners", f"got {WORLD_THREADS} ", "ulimit -u"):
+        assert text in errors
     assert not (tmp_path / "run").exists()
 
 

@@ -141,7 +141,7 @@ def test_paused_is_paused_and_steps_are_ticks(run):
         at_tick(page, 15)
         assert ticks(page) == [15] * 5
         page.keyboard.press("+")
-        until(lambda: page.inner_text("#speed-now"), lambda told: told == "× 2")
+        until(lambda: page.inner_text("#speed-now"), lambda text: text == "× 2")
         page.keyboard.press(" ")
         page.wait_for_selector("#state.running")
         until(lambda: int(page.get_attribute("#ticks", "data-tick")), lambda tick: tick > 25)
@@ -156,19 +156,19 @@ def test_page_disturbs_the_run_and_undoes_it_in_windows_of_any_width(run):
     _, address = run
     with chromium(address) as page:
         at_tick(page, 1)
-        whole = level(page, "components")
+        level_before = level(page, "components")
         slider = page.locator("#radio-loss")
         slider.focus()
         slider.press("End")
         page.click("#step10")
         at_tick(page, 11)
-        assert level(page, "components") == 20 > whole
+        assert level(page, "components") == 20 > level_before
         assert page.inner_text("#events li >> nth=0").split("\n")[:2] == ["tick 1", "radio.loss = 1.0 by hand"]
         slider.focus()
         slider.press("Home")
         page.click("#step")
         at_tick(page, 12)
-        assert level(page, "components") == whole
+        assert level(page, "components") == level_before
         page.select_option("#robot", "flock-3")
         page.click("#kill")
         page.wait_for_selector("text=next tick")
@@ -258,7 +258,7 @@ def test_page_listens_on_loopback_and_answers_only_with_the_token(run):
     for path in ("/", "/status", "/news", "/do", f"/x{address.split('/')[3]}/"):
         with pytest.raises(urllib.error.HTTPError, match="403"):
             urllib.request.urlopen(f"{origin}{path}", timeout=20)
-    until(lambda: status(address), lambda told: (told["state"], told["tick"]) == ("paused", 1))
+    until(lambda: status(address), lambda answer: (answer["state"], answer["tick"]) == ("paused", 1))
 
 
 def test_browser_requests_of_the_page_and_its_viewer_stay_on_this_machine(run):

@@ -21,8 +21,8 @@ SHOW = "import os; print(os.sched_getscheduler(0))"
 
 def may_be_raised() -> bool:
     """Whether this process may have a real-time priority."""
-    said: list[str] = []
-    with raised_priority(said.append):
+    lines: list[str] = []
+    with raised_priority(lines.append):
         return os.sched_getscheduler(0) == RAISED
 
 
@@ -95,14 +95,14 @@ def test_priority_that_is_not_permitted_prints_what_would_permit_it(
     def refuse(*_: object) -> None:
         raise PermissionError
 
-    said: list[str] = []
+    lines: list[str] = []
     with monkeypatch.context() as refusing:
         refusing.setattr(os, "sched_setscheduler", refuse)
         refusing.setattr(os, "geteuid", lambda: user)
         refusing.setattr(os, "getpriority", lambda *_: 0)  # also of tests that are nice
-        with raised_priority(said.append):
+        with raised_priority(lines.append):
             pass
-    assert said == [f"real time: other processes may delay the loop; to let it go before them: {permit}"]
+    assert lines == [f"real time: other processes may delay the loop; to let it go before them: {permit}"]
 
 
 def test_process_that_is_nice_gets_no_priority(tmp_path: Path):

@@ -35,84 +35,85 @@ def every_tick(monkeypatch):
     monkeypatch.setattr(published, "FRAMES_PER_S", NS_PER_S)
 
 
-def publish(folder, of, clock=None):
+def publish(folder, run, clock=None):
     """A published run of these, whose end the caller calls, and its metrics."""
     metrics = Metrics()
     observer = Published(folder, "r", metrics, clock or WallClock())
-    metrics.begin(of)
-    observer.begin(of)
+    metrics.begin(run)
+    observer.begin(run)
     return metrics, observer
 
 
 def live(folder):
     """The run that goes on in this folder."""
-    found = read_live(folder)
-    assert found is not None
-    return found
+    run = read_live(folder)
+    assert run is not None
+    return run
 
 
 def next_of(run) -> Any:
-    found = until(run.next)
-    assert found is not None
-    return found
+    tick = until(run.next)
+    assert tick is not None
+    return tick
 
 
 def test_nobody_looks_on_and_nothing_is_encoded(tmp_path, monkeypatch, every_tick):
     monkeypatch.setattr(published, "encode_truth", None)  # to call it would be an error
     observers = [metrics := Metrics(), shown := Published(tmp_path, "r", metrics, WallClock())]
-    found = []
+    lives = []
     result = run(
-        LOSSY, overrides=["duration_s=2"], observers=[*observers, At(3, lambda: found.append(read_live(tmp_path)))]
+        LOSSY, overrides=["duration_s=2"], observers=[*observers, At(3, lambda: lives.append(read_live(tmp_path)))]
     )
     assert (shown.frames, shown.left_out) == (0, 0)
     assert "observer_failed_Published" not in result.counts
-    assert found[0].pid == os.getpid()
+    assert lives[0].pid == os.getpid()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_observer_gets_scene_ticks_and_metrics(tmp_path, every_tick):
-    of = static(4, lights=[[]])
-    metrics, observer = publish(tmp_path, of)
+    run = static(4, lights=[[]])
+    metrics, observer = publish(tmp_path, run)
     try:
-        with subscribe(read_live(tmp_path)) as seen:
-            assert seen.scene.static == of
-            assert [series.name for series in seen.metrics] == [metric.name for metric in metrics.metrics]
+        with subscribe(read_live(tmp_path)) as observed:
+            assert observed.scene.static == run
+            assert [series.name for series in observed.metrics] == [metric.name for metric in metrics.metrics]
             until(observer._find_viewer)
             for tick in range(5):
-                now = truth(of, tick, pose=np.full((4, 3), tick / 7), edges=edges((0, 3)))
+                now = truth(run, tick, pose=np.full((4, 3), tick / 7), edges=edges((0, 3)))
                 metrics.see(now)
                 observer.see(now)
-                got = next_of(seen)
+                got = next_of(observed)
                 assert (got.truth.tick, got.serial, got.ticks) == (tick, tick, 1)
                 assert got.truth.pose.tolist() == now.pose.tolist()
                 assert got.truth.edges is not None
                 assert got.truth.edges.tolist() == [[0, 3]]
                 assert all(
-                    np.array_equal(seen.latest[name], metrics.latest[name], equal_nan=True) for name in seen.latest
+                    np.array_equal(observed.latest[name], metrics.latest[name], equal_nan=True)
+                    for name in observed.latest
                 )
             observer.end(None)
-            until(lambda: seen.next() or seen.over)
-            assert seen.lost == seen.bad == 0
+            until(lambda: observed.next() or observed.over)
+            assert observed.lost == observed.bad == 0
     finally:
         assert observer.end(None) == {"published": {"frames": 5, "left_out": 0}}
 
 
 def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tmp_path):
-    of, clock = static(2), StillClock()
-    metrics, observer = publish(tmp_path, of, clock)
+    run, clock = static(2), StillClock()
+    metrics, observer = publish(tmp_path, run, clock)
     try:
-        with subscribe(read_live(tmp_path)) as seen:
+        with subscribe(read_live(tmp_path)) as observed:
             until(observer._find_viewer)
             glimpses = []
             for tick in range(100):  # a hundredth of a second each
                 kill = (EventRecord(tick, 0.0, "kill", False, np.ones(2, np.bool_)),) if tick == 50 else ()
-                now = truth(of, tick, tally=tally({Fate.RECEIVED: 2}), contact_onsets=np.array([[1, 0]]), events=kill)
+                now = truth(run, tick, tally=tally({Fate.RECEIVED: 2}), contact_onsets=np.array([[1, 0]]), events=kill)
                 metrics.see(now)
                 clock.time_ns += NS_PER_S // 100
                 before = observer.frames
                 observer.see(now)
                 if observer.frames > before:
-                    glimpses.append(next_of(seen))
+                    glimpses.append(next_of(observed))
     finally:
         observer.end(None)
     last = glimpses[-1].truth.tick
@@ -124,23 +125,23 @@ def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tm
 
 
 def test_ticks_that_find_the_sender_busy_are_left_out_and_counted(tmp_path, monkeypatch, every_tick):
-    of, go = static(2), threading.Event()
+    run, go = static(2), threading.Event()
     monkeypatch.setattr(published, "encode_truth", lambda glimpse: go.wait() and encode_truth(glimpse))
-    metrics, observer = publish(tmp_path, of)
+    metrics, observer = publish(tmp_path, run)
     try:
-        with subscribe(read_live(tmp_path)) as seen:
+        with subscribe(read_live(tmp_path)) as observed:
             until(observer._find_viewer)
             for tick in range(20):
-                metrics.see(now := truth(of, tick, tally=tally({Fate.RECEIVED: 1})))
+                metrics.see(now := truth(run, tick, tally=tally({Fate.RECEIVED: 1})))
                 observer.see(now)
             go.set()
             assert observer.frames + observer.left_out == 20
             assert 1 <= observer.frames <= 2
-            got = [next_of(seen) for _ in range(observer.frames)]
+            got = [next_of(observed) for _ in range(observer.frames)]
             until(observer._frames.empty)
-            metrics.see(now := truth(of, 20, tally=tally({Fate.RECEIVED: 1})))
+            metrics.see(now := truth(run, 20, tally=tally({Fate.RECEIVED: 1})))
             observer.see(now)
-            got.append(next_of(seen))
+            got.append(next_of(observed))
             assert sum(glimpse.truth.tally.fates[0, Fate.RECEIVED] for glimpse in got if glimpse.truth.tally) == 21
     finally:
         go.set()
@@ -149,15 +150,15 @@ def test_ticks_that_find_the_sender_busy_are_left_out_and_counted(tmp_path, monk
 
 def test_error_of_the_sender_ends_the_publishing_not_the_run(tmp_path, monkeypatch, every_tick):
     monkeypatch.setattr(published, "encode_truth", lambda _: 1 / 0)
-    metrics, observer = publish(tmp_path, of := static(2))
+    metrics, observer = publish(tmp_path, run := static(2))
     try:
         with subscribe(read_live(tmp_path)):
             until(observer._find_viewer)
-            metrics.see(truth(of))
-            observer.see(truth(of))
+            metrics.see(truth(run))
+            observer.see(truth(run))
             until(lambda: observer._fault)
             with pytest.raises(ZeroDivisionError):
-                observer.see(truth(of, 1))
+                observer.see(truth(run, 1))
     finally:
         observer.end(None)
     assert read_live(tmp_path) is None
@@ -218,8 +219,10 @@ def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path, mon
         # A subscriber to everything is one to the truth, so the run is published.
         result = run(LOSSY, overrides=["duration_s=4"], runners=2, observers=[metrics, shown, At(1, listen)])
         keys = {
-            side: {str(sample.key_expr).split("/")[2] for sample in of if sample}
-            for side, of in {side: [found.try_recv() for _ in range(500)] for side, found in received.items()}.items()
+            side: {str(sample.key_expr).split("/")[2] for sample in samples if sample}
+            for side, samples in {
+                side: [channel.try_recv() for _ in range(500)] for side, channel in received.items()
+            }.items()
         }
     assert result.ticks == 40
     assert keys == {"runners": {"frame", "answer"}, "observers": {"truth"}}
@@ -247,7 +250,7 @@ def test_live_file_of_a_killed_run_is_not_believed(tmp_path):
 
 
 def test_paused_run_shows_its_newest_tick_to_each_new_observer(tmp_path):
-    metrics, found = Metrics(), []
+    metrics, ticks = Metrics(), []
     shown = Published(tmp_path, "r", metrics, WallClock())
 
     def looked(run):
@@ -257,10 +260,10 @@ def test_paused_run_shows_its_newest_tick_to_each_new_observer(tmp_path):
     def pause():
         for _ in range(2):  # the second begins to look on in the middle, after the first has gone
             with subscribe(read_live(tmp_path)) as run:
-                seen = until(lambda run=run: looked(run))
-                assert seen is not None
-                found.append(seen.truth.tick)
+                glimpse = until(lambda run=run: looked(run))
+                assert glimpse is not None
+                ticks.append(glimpse.truth.tick)
             until(lambda: shown.catch_up() or not shown._has_viewer)
 
     run(LOSSY, overrides=["duration_s=1"], observers=[metrics, shown, At(5, pause)])
-    assert found == [5, 5]
+    assert ticks == [5, 5]

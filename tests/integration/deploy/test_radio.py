@@ -25,12 +25,12 @@ SMALL = HEAD + "".join(f"{i},a,b,{i},{-50 - i},{1 + i}\n" for i in range(20))
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
-def said(*arguments: str | Path) -> str:
+def output_of(*arguments: str | Path) -> str:
     done = CliRunner().invoke(app, ["radio", "probe", *map(str, arguments)])
     if done.exception is not None:
         raise done.exception
@@ -38,11 +38,11 @@ def said(*arguments: str | Path) -> str:
 
 
 def contention(*arguments: str) -> dict[str, float]:
-    return json.loads(said(*arguments, "--runs", "2"))
+    return json.loads(output_of(*arguments, "--runs", "2"))
 
 
 def coverage(*arguments: str | Path) -> dict[str, Any]:
-    return json.loads(said(*arguments, "--json"))
+    return json.loads(output_of(*arguments, "--json"))
 
 
 def test_contention_costs_delivery_and_time():
@@ -56,24 +56,29 @@ def test_values_of_the_radio_may_be_set():
 
 
 def test_disk_radio_covers_its_circle_from_the_given_position_or_robot():
-    found = coverage(LOSSY, "--at", "-1,0", "--seed", "4")
-    assert (found["seed"], found["range_m"], found["sensitivity_dbm"], found["map"]["mean_dbm"]) == (4, 2.0, None, None)
-    assert found["map"]["at_m"] == [-1.0, 0.0]
-    assert 0.15 < found["in_range_share"] < 3.15 * 2.0**2 / 64
-    assert found["by_distance"]["delivery"]["high"][0] == 0.7
-    assert found["by_distance"]["delivery"]["high"][-1] == 0.0
+    summary = coverage(LOSSY, "--at", "-1,0", "--seed", "4")
+    assert (summary["seed"], summary["range_m"], summary["sensitivity_dbm"], summary["map"]["mean_dbm"]) == (
+        4,
+        2.0,
+        None,
+        None,
+    )
+    assert summary["map"]["at_m"] == [-1.0, 0.0]
+    assert 0.15 < summary["in_range_share"] < 3.15 * 2.0**2 / 64
+    assert summary["by_distance"]["delivery"]["high"][0] == 0.7
+    assert summary["by_distance"]["delivery"]["high"][-1] == 0.0
     robots = [coverage(LOSSY, *which)["map"]["at_m"] for which in ((), ("--from", "flock-0"), ("--from", "flock-19"))]
     assert robots[0] == robots[1] != robots[2]
 
 
 def test_signals_have_a_strength_that_walls_and_distance_take():
-    found = coverage(WALLED, "--at", "0,1", "--bytes", "20", "--set", "radio.walls.crossing_db=60")
-    x_m, y_m, mean_dbm = (found["map"][name] for name in ("x_m", "y_m", "mean_dbm"))
+    summary = coverage(WALLED, "--at", "0,1", "--bytes", "20", "--set", "radio.walls.crossing_db=60")
+    x_m, y_m, mean_dbm = (summary["map"][name] for name in ("x_m", "y_m", "mean_dbm"))
     column = min(range(len(x_m)), key=lambda i: abs(x_m[i]))
     below, above = (mean_dbm[min(range(len(y_m)), key=lambda i: abs(y_m[i] - y))][column] for y in (2.5, 3.5))
     assert above < below - 55.0
-    assert found["payload_bytes"] == 20
-    strength = found["by_distance"]["mean_dbm"]["mean"]
+    assert summary["payload_bytes"] == 20
+    strength = summary["by_distance"]["mean_dbm"]["mean"]
     assert strength[0] > strength[-1]
 
 
@@ -83,7 +88,7 @@ def test_coverage_of_a_robot_has_the_power_of_its_group():
         coverage(jammed, "--from", "lead-0", "--set", f"robots.lead.radio.power_dbm={dbm}") for dbm in (-25.0, -5.0)
     )
     assert base["map"]["at_m"] == strong["map"]["at_m"]
-    by_distance = [found["by_distance"]["mean_dbm"]["mean"] for found in (base, strong)]
+    by_distance = [summary["by_distance"]["mean_dbm"]["mean"] for summary in (base, strong)]
     assert by_distance[1][5] == pytest.approx(by_distance[0][5] + 20.0)
 
 
@@ -109,34 +114,34 @@ def test_coverage_of_a_robot_has_the_power_of_its_group():
 )
 def test_probe_arguments_that_are_invalid_are_refused(arguments, where, key):
     with pytest.raises(BadInput) as error:
-        said(*arguments)
+        output_of(*arguments)
     assert (error.value.where, error.value.key) == (where, key)
 
 
-def test_fit_of_a_log_gives_a_table_a_picture_and_a_radio_for_a_scenario(here, monkeypatch, capsys):
+def test_fit_of_a_log_gives_a_table_a_picture_and_a_radio_for_a_scenario(folder, monkeypatch, capsys):
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
-    (here / "log.csv").write_text(csv_of(made(1, Shadowing(4.0, 5.0), Bursts(0.5, 5.0), packets=60)))
+    (folder / "log.csv").write_text(csv_of(made(1, Shadowing(4.0, 5.0), Bursts(0.5, 5.0), packets=60)))
     to = ["--to", "fit.png", "--to", "radio.toml", "--power-dbm", "4"]
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", *to)
     assert (code, errors) == (0, "")
     for words in ("path loss exponent", "standard error", "correlation distance", "bursts: mean", "root mean square"):
         assert words in out
     assert out.endswith("written: fit.png\nwritten: radio.toml\n")
-    assert (here / "fit.png").read_bytes().startswith(b"\x89PNG")
-    radio = tomllib.loads((here / "radio.toml").read_text())["radio"]
+    assert (folder / "fit.png").read_bytes().startswith(b"\x89PNG")
+    radio = tomllib.loads((folder / "radio.toml").read_text())["radio"]
     assert sorted(radio) == ["antenna", "bursts", "log_distance", "model", "shadowing"]
     assert 42.0 < radio["log_distance"]["reference_loss_db"] < 46.0
 
 
 @pytest.mark.parametrize("farthest_m", [2.0, 15.5, 1e6])
-def test_fit_picture_has_labelled_distances(here, monkeypatch, capsys, farthest_m):
+def test_fit_picture_has_labelled_distances(folder, monkeypatch, capsys, farthest_m):
     pytest.importorskip("matplotlib", reason="needs the extra [report]")
     from swarmwire.metrics.pictures.drawing import canvas, radio_fit
 
     drawn = []
     monkeypatch.setattr(radio_fit, "save", lambda figure, to: (drawn.append(figure), canvas.save(figure, to)))
     step = math.log10(farthest_m / 1.2) / 19
-    (here / "log.csv").write_text(rows(20, lambda i: -50 - 30 * step * i, lambda i: 1.2 * 10.0 ** (step * i)))
+    (folder / "log.csv").write_text(rows(20, lambda i: -50 - 30 * step * i, lambda i: 1.2 * 10.0 ** (step * i)))
     code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "fit.png")
     assert (code, errors) == (0, "")
     axis, (low, high) = drawn[0].axes[0].xaxis, drawn[0].axes[0].get_xlim()
@@ -145,23 +150,23 @@ def test_fit_picture_has_labelled_distances(here, monkeypatch, capsys, farthest_
 
 
 def test_people_get_a_table_and_a_picture(tmp_path):
-    text = said(WALLED, "--to", tmp_path / "coverage.png")
+    text = output_of(WALLED, "--to", tmp_path / "coverage.png")
     assert "sensitivity -101.0 dBm" in text
     assert "% of the arena in range" in text
     assert max(len(line) for line in text.splitlines() if "│" in line) <= 80
     assert text.splitlines()[-1] == f"written: {tmp_path / 'coverage.png'}"
     assert (tmp_path / "coverage.png").read_bytes().startswith(b"\x89PNG")
-    json.loads(said(LOSSY, "--json", "--to", tmp_path / "disk.svg").splitlines()[0])
+    json.loads(output_of(LOSSY, "--json", "--to", tmp_path / "disk.svg").splitlines()[0])
     assert "</svg>" in (tmp_path / "disk.svg").read_text()
 
 
-def test_without_a_file_the_table_is_printed_and_what_is_left_out_is_named(here, monkeypatch, capsys):
-    (here / "log.csv").write_text(SMALL)
+def test_without_a_file_the_table_is_printed_and_what_is_left_out_is_named(folder, monkeypatch, capsys):
+    (folder / "log.csv").write_text(SMALL)
     code, out, _ = called(monkeypatch, capsys, "radio", "fit", "log.csv")
     assert code == 0
     assert "20 packets on 1 link, 20 received" in out
-    for said in ("shadowing: needs positions", "losses: needs 100 packets, got 20"):
-        assert f"left out: {said}" in out
+    for text in ("shadowing: needs positions", "losses: needs 100 packets, got 20"):
+        assert f"left out: {text}" in out
     assert "log_distance" in tomllib.loads(out[out.index("# Fitted to") :])["radio"]
 
 
@@ -185,19 +190,19 @@ LOGS = {
 
 
 @pytest.mark.parametrize("name", LOGS)
-def test_fitted_radio_is_accepted_in_a_scenario(here, monkeypatch, capsys, name):
-    (here / "log.csv").write_text(LOGS[name])
+def test_fitted_radio_is_accepted_in_a_scenario(folder, monkeypatch, capsys, name):
+    (folder / "log.csv").write_text(LOGS[name])
     code, _, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "radio.toml")
     assert (code, errors) == (0, "")
-    text = (here / "radio.toml").read_text()
+    text = (folder / "radio.toml").read_text()
     radio = tomllib.loads(text)["radio"]
     scenario = tomllib.loads((ROOT / "scenarios" / "flocking-lossy.toml").read_text())
-    whole = "model" in radio
-    assert whole == (name in ("falls", "strong"))
-    assert ("# Without path loss this is no radio yet" in text) == ("# Left out: path loss: " in text) == (not whole)
-    kept = {} if whole else {"range_m": 2.0}
-    taken = scenario_from({**scenario, "radio": {**kept, **radio}}, "radio.toml").radio
-    assert taken is not None
+    complete = "model" in radio
+    assert complete == (name in ("falls", "strong"))
+    assert ("# Without path loss this is no radio yet" in text) == ("# Left out: path loss: " in text) == (not complete)
+    base = {} if complete else {"range_m": 2.0}
+    accepted = scenario_from({**scenario, "radio": {**base, **radio}}, "radio.toml").radio
+    assert accepted is not None
     assert ("bursts" in radio) == (name == "bursts")
 
 
@@ -213,19 +218,19 @@ def test_fitted_radio_is_accepted_in_a_scenario(here, monkeypatch, capsys, name)
         (rows(50, lambda _: -60, lambda i: 1 + i), ("path loss: RSSI", "losses: needs 100 ")),
     ],
 )
-def test_log_that_allows_no_fit_is_refused_with_the_reasons(here, monkeypatch, capsys, text, reasons):
-    (here / "log.csv").write_text(text)
+def test_log_that_allows_no_fit_is_refused_with_the_reasons(folder, monkeypatch, capsys, text, reasons):
+    (folder / "log.csv").write_text(text)
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv", "--to", "radio.toml")
     assert (code, out) == (2, "")
     assert errors.startswith("error: log.csv: ")
     assert errors.count("\n") == 1
     assert all(re.search(reason, errors) for reason in reasons)
-    assert not (here / "radio.toml").exists()
+    assert not (folder / "radio.toml").exists()
 
 
-def test_fit_beyond_what_a_scenario_takes_is_refused_with_the_key(here, monkeypatch, capsys):
+def test_fit_beyond_what_a_scenario_takes_is_refused_with_the_key(folder, monkeypatch, capsys):
     slow = (f"{i * 1e6},a,b,{i},{-60 if i % 50 > 9 else ''},2\n" for i in range(2000))
-    (here / "log.csv").write_text(HEAD + "".join(slow))
+    (folder / "log.csv").write_text(HEAD + "".join(slow))
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", "log.csv")
     assert (code, out) == (2, "")
     assert errors.startswith("error: log.csv: fitted radio.bursts.")
@@ -245,16 +250,16 @@ def test_fit_beyond_what_a_scenario_takes_is_refused_with_the_key(here, monkeypa
         (["log.csv", "--within", "0.5"], "--within"),
     ],
 )
-def test_fit_options_that_are_invalid_are_refused_in_one_line(here, monkeypatch, capsys, arguments, where):
-    (here / "log.csv").write_text(SMALL)
+def test_fit_options_that_are_invalid_are_refused_in_one_line(folder, monkeypatch, capsys, arguments, where):
+    (folder / "log.csv").write_text(SMALL)
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", *arguments)
     assert (code, out, errors.count("\n")) == (2, "", 1)
     assert errors.startswith(f"error: {where}: ")
 
 
-def test_brackets_in_notes_are_printed_as_they_are(here, monkeypatch, capsys):
+def test_brackets_in_notes_are_printed_as_they_are(folder, monkeypatch, capsys):
     rows = [f"{0.1 * i},a,b,{i},{0.9 if i % 4 == 0 else 0.01 + 1e-5 * i}\n" for i in range(200)]
-    (here / "received[1].csv").write_text("t_s,tx,rx,seq,latency_s\n" + "".join(rows))
+    (folder / "received[1].csv").write_text("t_s,tx,rx,seq,latency_s\n" + "".join(rows))
     code, out, _ = called(monkeypatch, capsys, "radio", "fit", "received[1].csv")
     assert code == 0
     assert out.startswith("received[1].csv: 200 packets")

@@ -72,12 +72,12 @@ def relays(folder: Path) -> list[str]:
 
 def frames_of(folder: Path) -> list[dict[str, Any]]:
     """What was recorded of what came from outside, by tick."""
-    data, found = (folder / INPUTS).read_bytes(), list[dict[str, Any]]()
+    data, frames = (folder / INPUTS).read_bytes(), list[dict[str, Any]]()
     while data:
         stop = LENGTH_BYTES + int.from_bytes(data[:LENGTH_BYTES], "little")
-        found.append(msgpack.unpackb(data[LENGTH_BYTES:stop]))
+        frames.append(msgpack.unpackb(data[LENGTH_BYTES:stop]))
         data = data[stop:]
-    return found
+    return frames
 
 
 @pytest.mark.parametrize("runners", [None, 2])
@@ -88,12 +88,12 @@ def test_packets_cross_between_ticks_fates_add_up_and_the_run_is_the_same_again(
     assert result.radio is not None
     assert sum(result.radio.fates.values()) == result.radio.intended
     assert result.radio.fates["received"] > 0
-    told = result.realtime
-    assert told is not None
-    assert told.delivery is not None
-    assert told.tick_jitter is not None
-    assert (told.subtick_s, told.tick_jitter.count) == (SUBTICK_S, 9)
-    assert told.delivery.count >= result.radio.fates["received"]
+    pace = result.realtime
+    assert pace is not None
+    assert pace.delivery is not None
+    assert pace.tick_jitter is not None
+    assert (pace.subtick_s, pace.tick_jitter.count) == (SUBTICK_S, 9)
+    assert pace.delivery.count >= result.radio.fates["received"]
     assert result.inputs is not None
     assert (result.inputs.first_tick, result.inputs.ticks) == (0, 10)
     assert any(WITHIN in frame["arrays"] for frame in frames_of(folder))
@@ -132,11 +132,11 @@ def test_rehearsal_moves_robots_receives_packets_and_measures_metrics(monkeypatc
     world = World(scenario, [1], {"flock": ("radio.range",)})
     fates, see = np.zeros(len(Fate), np.int64), Metrics.see
 
-    def seen(self, truth) -> None:
+    def see_fates(self, truth) -> None:
         fates[:] += truth.tally.fates[0]
         see(self, truth)
 
-    monkeypatch.setattr(Metrics, "see", seen)
+    monkeypatch.setattr(Metrics, "see", see_fates)
     before = world.pose.copy()
     warm_up(world, new_medium(scenario, world, None), [Speed()])
     assert np.hypot(*(world.pose - before)[:, :2].T).min() > 0.0
@@ -164,7 +164,7 @@ def test_rehearsal_receives_packets_within_ticks_if_the_run_has_subticks(subtick
 
 def test_rehearsal_comes_before_every_real_time_run_and_changes_nothing(monkeypatch) -> None:
     rehearsed = list[int]()
-    monkeypatch.setattr(phases, "warm_up", lambda *given, **by: (rehearsed.append(1), warm_up(*given, **by)))
+    monkeypatch.setattr(phases, "warm_up", lambda *arguments, **by: (rehearsed.append(1), warm_up(*arguments, **by)))
     results = list[list[str]]()
     for factor in (None, 1000.0):
         with Simulation(FLOCKING, realtime=factor) as simulation:

@@ -276,8 +276,8 @@ def test_folder_without_a_run_is_refused_in_one_line(tmp_path, mine, spoil, expe
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("logged", "kept", "ticks"), [(True, False, 7), (True, True, 20), (False, False, 20)])
-def test_killed_run_is_compared_as_far_as_it_came(tmp_path, mine, logged, kept, ticks):
+@pytest.mark.parametrize(("logged", "recorded", "ticks"), [(True, False, 7), (True, True, 20), (False, False, 20)])
+def test_killed_run_is_compared_as_far_as_it_came(tmp_path, mine, logged, recorded, ticks):
     """As SIGKILL leaves it: the folder of a run that was stepped, before it could write its summary."""
     with Simulation(mine, out=tmp_path / "run") as simulation:
         simulation.run(7)
@@ -285,7 +285,7 @@ def test_killed_run_is_compared_as_far_as_it_came(tmp_path, mine, logged, kept, 
     assert (tmp_path / "killed" / DIGESTS).stat().st_size == 7 * DIGEST_BYTES
     if not logged:
         (tmp_path / "killed" / DIGESTS).unlink()
-    repetition = repeat(tmp_path / "killed", out=tmp_path / "again" if kept else None)
+    repetition = repeat(tmp_path / "killed", out=tmp_path / "again" if recorded else None)
     assert repetition.result.ticks == ticks
     assert repetition.before is None
     assert repetition.compared == (7 if logged else 0)
@@ -429,9 +429,9 @@ def in_real_time(recorded, tmp_path) -> Path:
 
 
 def test_record_of_a_real_time_run_has_each_tick_and_nothing_between(recorded):
-    found = frames_of(recorded)
-    assert len(found) == 10
-    assert not any(WITHIN in frame["arrays"] for frame in found)
+    frames = frames_of(recorded)
+    assert len(frames) == 10
+    assert not any(WITHIN in frame["arrays"] for frame in frames)
     assert repeat(recorded).same
 
 

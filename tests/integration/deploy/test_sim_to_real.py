@@ -18,8 +18,8 @@ from tests.support.metrics.real_logs import METRICS, SMALL, as_bag, as_logs, flo
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
     """A run's folder, and the logs that its robots would have written."""
-    here = tmp_path_factory.mktemp("sim-to-real")
-    return here / "run", as_logs(watched(out=here / "run"), here / "logs")
+    folder = tmp_path_factory.mktemp("sim-to-real")
+    return folder / "run", as_logs(watched(out=folder / "run"), folder / "logs")
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +49,10 @@ def test_differences_of_settings_stand_before_the_numbers(folders, tmp_path, mon
         (robot / "robot.json").write_text(json.dumps({**says, "rate_hz": 20, "params": {"alignment": 2.0}}))
     code, out, _ = called(monkeypatch, capsys, "sim-to-real", folders[0], logs)
     assert code == 0
-    told = [line for line in out.splitlines() if line.startswith("note: different ")]
-    for said in ("robots: 6 .*5", "10 Hz .*20 Hz", "separation_m 0.8 .*0.4 .*alignment 1.0 .*2.0", "body epuck"):
-        assert any(re.search(said, line) for line in told), said
-    assert out.splitlines()[0] == told[0]
+    lines = [line for line in out.splitlines() if line.startswith("note: different ")]
+    for text in ("robots: 6 .*5", "10 Hz .*20 Hz", "separation_m 0.8 .*0.4 .*alignment 1.0 .*2.0", "body epuck"):
+        assert any(re.search(text, line) for line in lines), text
+    assert out.splitlines()[0] == lines[0]
 
 
 def test_another_agent_is_named(folders, tmp_path, monkeypatch, capsys):
@@ -75,8 +75,8 @@ def test_shorter_log_is_not_compared_with_a_longer_runs_totals(folders, campaign
     logs = as_logs(watched("duration_s=8"), tmp_path / "logs")
     out = called(monkeypatch, capsys, "sim-to-real", f"{campaign}@radio.loss=0.3", logs)[1]
     assert not [line for line in out.splitlines() if line.startswith(("total pdr ", "packets sent", "latency p50"))]
-    told = next(line for line in out.splitlines() if line.startswith("not compared: packets sent, total pdr, latency "))
-    assert "20 s" in told
+    line = next(line for line in out.splitlines() if line.startswith("not compared: packets sent, total pdr, latency "))
+    assert "20 s" in line
     out = called(monkeypatch, capsys, "sim-to-real", folders[0], logs)[1]  # a run folder has counts of each tick
     assert [line for line in out.splitlines() if line.startswith("packets sent")]
     assert "not compared: total pdr, latency " in out or "not compared: latency " in out
@@ -103,7 +103,7 @@ def test_sim_to_real_arguments_that_are_invalid_are_refused_in_one_line(
 ):
     run, logs = folders
     (tmp_path / "empty").mkdir()
-    for arguments, told in (
+    for arguments, message in (
         ((tmp_path / "empty", logs), f"{tmp_path}/empty: "),
         ((run, tmp_path / "empty"), "robot.json"),
         ((run, tmp_path / "none"), f"{tmp_path}/none: "),
@@ -114,7 +114,7 @@ def test_sim_to_real_arguments_that_are_invalid_are_refused_in_one_line(
         code, out, errors = called(monkeypatch, capsys, "sim-to-real", *arguments)
         assert (code, out) == (2, ""), arguments
         assert errors.startswith("error: ")
-        assert told in errors
+        assert message in errors
         assert errors.count("\n") == 1
 
 
@@ -123,8 +123,8 @@ def test_fit_of_a_swarms_logs_gives_a_radio_that_a_scenario_takes(folders, tmp_p
     to = ["--to", tmp_path / "fit.png", "--to", tmp_path / "radio.toml"]
     code, out, errors = called(monkeypatch, capsys, "radio", "fit", folders[1], *to)
     assert (code, errors) == (0, "")
-    for said in ("latency", "jitter", "delivery by link", "neighbours of flock-0: flock-1", "all losses count here"):
-        assert said in out
+    for text in ("latency", "jitter", "delivery by link", "neighbours of flock-0: flock-1", "all losses count here"):
+        assert text in out
     assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
     table = tomllib.loads((tmp_path / "radio.toml").read_text())["radio"]
     assert table["latency_s"] == pytest.approx(0.1, abs=0.002)
@@ -171,9 +171,9 @@ POSES = ("--poses", "/{name}/pose")
 @pytest.fixture(scope="module")
 def bags(tmp_path_factory):
     """A run, the logs that its robots would have written, and a bag with the same content."""
-    here = tmp_path_factory.mktemp("bags")
-    logs = as_logs(watched(*OSCILLATING[len(SMALL) :], out=here / "run"), here / "logs")
-    return here / "run", logs, as_bag(logs, here / "bag")
+    folder = tmp_path_factory.mktemp("bags")
+    logs = as_logs(watched(*OSCILLATING[len(SMALL) :], out=folder / "run"), folder / "logs")
+    return folder / "run", logs, as_bag(logs, folder / "bag")
 
 
 def table(path):
@@ -190,11 +190,11 @@ def test_bag_of_robots_is_compared_as_their_logs_are(bags, tmp_path, monkeypatch
     of_logs, of_bag = table(tmp_path / "logs.csv"), table(tmp_path / "bag.csv")
     assert {"speed", "order", "oscillation", "link_pdr", "latency_air"} <= {row[0] for row in of_bag}
     for expected, row in zip(of_logs, of_bag, strict=True):
-        for value, found in zip(expected, row, strict=True):
+        for value, number in zip(expected, row, strict=True):
             try:
-                assert float(found) == pytest.approx(float(value), rel=1e-4, abs=1e-5, nan_ok=True)
+                assert float(number) == pytest.approx(float(value), rel=1e-4, abs=1e-5, nan_ok=True)
             except ValueError:
-                assert found == value
+                assert number == value
 
 
 def test_radio_fitted_to_a_bag_is_that_of_the_logs(bags, monkeypatch, capsys):

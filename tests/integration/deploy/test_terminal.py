@@ -23,8 +23,8 @@ SHORT = ("--set", "duration_s=2")
 
 
 def tick(picture: str) -> int:
-    found = re.search(r"tick +(\d+)/36000", picture)
-    return int(found[1]) if found else -1
+    match = re.search(r"tick +(\d+)/36000", picture)
+    return int(match[1]) if match else -1
 
 
 def test_panel_shows_a_pause_and_a_speed_of_ctl_and_ends_with_the_run(tmp_path):
@@ -113,9 +113,9 @@ def listens_at(process: "subprocess.Popen[str]") -> tuple[str, str]:
     while "listens at" not in line:
         assert line, process.stderr and process.stderr.read()
         line = process.stdout.readline()
-    found = re.search(r"listens at (\S+)[,;]", line)
-    assert found
-    return found[1], process.stdout.readline().strip()
+    match = re.search(r"listens at (\S+)[,;]", line)
+    assert match
+    return match[1], process.stdout.readline().strip()
 
 
 def test_join_from_two_terminals_makes_the_same_run_as_one(tmp_path):
@@ -150,16 +150,16 @@ def test_join_from_two_terminals_makes_the_same_run_as_one(tmp_path):
 
 
 def test_observe_address_in_use_is_refused_before_anybody_joins(tmp_path):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        at = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        at = f"tcp/127.0.0.1:{listener.getsockname()[1]}"
         listening = ("--listen", "tcp/127.0.0.1:0", "--observe", at)
         with world(tmp_path / "run", *listening) as process:
-            _, told = process.communicate()
+            _, errors = process.communicate()
     assert process.returncode == 2
-    assert f"--observe: {at}: " in told
-    assert "Traceback" not in told
+    assert f"--observe: {at}: " in errors
+    assert "Traceback" not in errors
     assert not (tmp_path / "run").exists()
 
 

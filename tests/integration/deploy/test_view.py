@@ -51,10 +51,10 @@ def viewing(*arguments):
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         try:
-            said = process.stderr.readline()
-            found = re.search(r"http://127\.0\.0\.1:\d+/\S+/", said)
-            assert found, said + process.stderr.read()
-            yield process, found[0]
+            line = process.stderr.readline()
+            match = re.search(r"http://127\.0\.0\.1:\d+/\S+/", line)
+            assert match, line + process.stderr.read()
+            yield process, match[0]
         finally:
             for one in reversed([process, *family(process)]):
                 with contextlib.suppress(psutil.NoSuchProcess):
@@ -193,11 +193,11 @@ def live_run(folder, *observers, duration_s=3):
 
 
 def test_live_view_listens_on_loopback_and_its_death_leaves_the_run_alone(tmp_path, capfd):
-    view, addresses, told = LiveView(tmp_path, web=True), [], []
+    view, addresses, texts = LiveView(tmp_path, web=True), [], []
 
     def told_where():
-        told.append(capfd.readouterr().err)
-        return "open http://127.0.0.1:" in "".join(told)
+        texts.append(capfd.readouterr().err)
+        return "open http://127.0.0.1:" in "".join(texts)
 
     def look():
         until(told_where)
@@ -284,8 +284,8 @@ def test_published_run_is_drawn_in_the_viewer(tmp_path, viewer_for):
     with viewer_for(drawn, tmp_path) as target, held:
 
         def follow():
-            seen = held.enter_context(subscribe(read_live(tmp_path)))
-            drawer = Drawer(seen, target, ViewOptions(clock, print, lambda: False))
+            run = held.enter_context(subscribe(read_live(tmp_path)))
+            drawer = Drawer(run, target, ViewOptions(clock, print, lambda: False))
             drawer.start()
             held.callback(drawer.join)
 

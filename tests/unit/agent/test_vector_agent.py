@@ -101,14 +101,14 @@ def test_column_refuses_values_that_it_cannot_represent() -> None:
 
 def test_memory_inherits_columns_without_changing_its_base() -> None:
     class More(Table):
-        seen: BoolColumn = column(False)
+        charged: BoolColumn = column(False)
         n: IntColumn = column(4)
 
-    assert list(More.columns) == ["x", "n", "seen"]
+    assert list(More.columns) == ["x", "n", "charged"]
     assert list(Table.columns) == ["x", "n"]
     assert More.fresh(1).n.tolist() == [4]
     assert Table.fresh(1).n.tolist() == [-1]
-    assert More.fresh(1).seen.dtype == np.bool_
+    assert More.fresh(1).charged.dtype == np.bool_
 
 
 @given(rows_, rows_)

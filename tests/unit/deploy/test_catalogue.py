@@ -32,11 +32,11 @@ from tests.support.custom_code import install
 from tests.support.deploy.runs import LOSSY, ROOT, called
 from tests.support.refusals import refused_input
 
-EVENTS = {next(of.default for of in fields(kind) if of.name == "do"): kind for kind in ACTIONS}
+EVENTS = {next(field.default for field in fields(kind) if field.name == "do"): kind for kind in ACTIONS}
 OF_EACH_KIND = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 HELD = {
     "bodies": [*body_names()],
-    "sensors": [*SENSOR_SPECS, *(f"radio.{of.name}" for of in fields(Measures)), TX_STATUS],
+    "sensors": [*SENSOR_SPECS, *(f"radio.{field.name}" for field in fields(Measures)), TX_STATUS],
     "behaviours": behaviours.__all__,
     "drives": [*DRIVES],
     "engines": [*get_args(PhysicsTable.model_fields["engine"].annotation)],

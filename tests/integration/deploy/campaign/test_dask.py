@@ -53,8 +53,8 @@ def reference(tmp_path_factory):
 def one_worker(tmp_path_factory):
     """A cluster that gives a task of which a worker dies to no other."""
     settings = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
-    with cluster(tmp_path_factory.mktemp("cluster"), 1, **settings) as found:
-        yield found
+    with cluster(tmp_path_factory.mktemp("cluster"), 1, **settings) as opened:
+        yield opened
 
 
 class Observer:
@@ -120,46 +120,46 @@ def interrupted_once_at_work(nanny):
     def execute_interrupted(tasks, executor, keep, stopped):
         before, sent = worked_s(), []
 
-        def asked():
+        def interrupted():
             if worked_s() > before + 0.5 and not sent:
                 sent.append(os.kill(os.getpid(), signal.SIGINT))
             return stopped()
 
-        return execute(tasks, executor, keep, asked)
+        return execute(tasks, executor, keep, interrupted)
 
     return execute_interrupted
 
 
 def test_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference):
-    with cluster(tmp_path, 1) as there:
-        gone = []
+    with cluster(tmp_path, 1) as opened:
+        processes = []
 
         def kill_it():
-            there.add_worker()  # which joins a campaign that has begun
-            gone.extend(children(there.nannies[0]))
-            there.nannies[0].kill()
+            opened.add_worker()  # which joins a campaign that has begun
+            processes.extend(children(opened.nannies[0]))
+            opened.nannies[0].kill()
 
         done = sweep(
-            reference / "two.toml", out=tmp_path / "c", executor=there.name, observer=Observer(kill_it),
+            reference / "two.toml", out=tmp_path / "c", executor=opened.name, observer=Observer(kill_it),
             **{**ASKED, "batch": 1},
         )  # fmt: skip
         assert done.is_over
         assert len(workers_of(tmp_path / "c")) == 2
-        assert psutil.wait_procs(gone, timeout=30)[1] == []
+        assert psutil.wait_procs(processes, timeout=30)[1] == []
     same(tmp_path / "c", reference)
 
 
 @pytest.mark.slow  # dask waits fifteen seconds at least
 def test_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference):
-    with cluster(tmp_path, 1, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="15s") as there:  # in place of five minutes
+    with cluster(tmp_path, 1, DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL="15s") as opened:  # in place of five minutes
 
         def freeze_it():
-            there.add_worker()
-            for child in children(there.nannies[0]):
+            opened.add_worker()
+            for child in children(opened.nannies[0]):
                 child.suspend()
 
         done = sweep(
-            reference / "two.toml", out=tmp_path / "c", executor=there.name, observer=Observer(freeze_it),
+            reference / "two.toml", out=tmp_path / "c", executor=opened.name, observer=Observer(freeze_it),
             **{**ASKED, "batch": 1},
         )  # fmt: skip
         assert done.is_over
@@ -170,10 +170,10 @@ def test_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference)
 def test_run_that_stands_still_ends_its_worker_and_is_a_failed_row(tmp_path, reference):
     (tmp_path / "short.py").write_text("from swarmwire.deploy.campaigns import dask\ndask.MAX_SILENCE_S = 3.0\n")
     (reference / "hanging.py").write_text(HANGING)
-    with cluster(tmp_path, 0, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0") as there:
-        there.add_worker(preload=tmp_path / "short.py")
+    with cluster(tmp_path, 0, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0") as opened:
+        opened.add_worker(preload=tmp_path / "short.py")
         agent = ['robots.pair.agent="hanging.py:Hanging"']
-        done = sweep(reference / "two.toml", seeds=1, out=tmp_path / "c", executor=there.name, overrides=agent)
+        done = sweep(reference / "two.toml", seeds=1, out=tmp_path / "c", executor=opened.name, overrides=agent)
     assert (done.is_over, done.failed) == (True, 1)
     assert rows_in(tmp_path / "c")[0]["error"] == "the worker died"
 
@@ -182,17 +182,17 @@ def test_scheduler_that_is_killed_is_one_line_and_the_sweep_resumes_here(
     tmp_path, reference, monkeypatch, capsys, caplog
 ):
     folder = tmp_path / "c"
-    with cluster(tmp_path, 1) as there:
-        monkeypatch.setattr(sweep_action, "SweepProgress", lambda _: Observer(there.scheduler.kill))
+    with cluster(tmp_path, 1) as opened:
+        monkeypatch.setattr(sweep_action, "SweepProgress", lambda _: Observer(opened.scheduler.kill))
         vary, batch = ("--vary", "radio.loss=0.0,0.5"), ("--batch", "1")
         code, _, errors = called(
             monkeypatch, capsys, "sweep", reference / "two.toml", *vary, "--seeds", "4", *batch, "--out", folder,
-            "--executor", there.name,
+            "--executor", opened.name,
         )  # fmt: skip
     assert (code, caplog.text) == (1, "")
-    told = f"error: {there.name}: .*--resume {folder}.*--executor local"
+    pattern = f"error: {opened.name}: .*--resume {folder}.*--executor local"
     assert [line for line in errors.splitlines() if "waiting" not in line] == [errors.splitlines()[-1]]
-    assert re.fullmatch(told, errors.splitlines()[-1])
+    assert re.fullmatch(pattern, errors.splitlines()[-1])
     assert 1 <= len(rows_in(folder)) < 8
     with monkeypatch.context() as patched:
         patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
@@ -206,7 +206,7 @@ def test_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, one
     monkeypatch.setattr(dask, "PREPARE_S", 1.0)
     monkeypatch.setattr(dask, "MAX_MUTE_POLLS", 3)
     frozen = one_worker.scheduler.suspend
-    monkeypatch.setattr(sweeping, "execute", lambda *given: [frozen(), schedule.execute(*given)][1])
+    monkeypatch.setattr(sweeping, "execute", lambda *arguments: [frozen(), schedule.execute(*arguments)][1])
     try:
         with pytest.raises(ClusterFailed, match="--resume"):
             sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, overrides=LONG)
@@ -216,46 +216,46 @@ def test_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, one
 
 def test_without_workers_or_with_one_of_another_version_nothing_begins(tmp_path, reference):
     (tmp_path / "odd.py").write_text(ODD)
-    told = []
-    with cluster(tmp_path, 0) as there:
-        with pytest.raises(ClusterFailed, match=rf"^{there.name}: .*0\.1 s"):
-            DaskExecutor(there.name, None, Path(), report=told.append, no_worker_s=0.1)
-        assert len(told) == 1
-        assert told[0].startswith(f"{there.name}: ")
-        there.add_worker(preload=tmp_path / "odd.py")
+    lines = []
+    with cluster(tmp_path, 0) as opened:
+        with pytest.raises(ClusterFailed, match=rf"^{opened.name}: .*0\.1 s"):
+            DaskExecutor(opened.name, None, Path(), report=lines.append, no_worker_s=0.1)
+        assert len(lines) == 1
+        assert lines[0].startswith(f"{opened.name}: ")
+        opened.add_worker(preload=tmp_path / "odd.py")
         with pytest.raises(BadInput, match=r"numpy.* 1\.0") as refused:
-            sweep(reference / "two.toml", seeds=1, out=tmp_path / "c", executor=there.name)
+            sweep(reference / "two.toml", seeds=1, out=tmp_path / "c", executor=opened.name)
         assert refused.value.where == "executor"
         assert not (tmp_path / "c").exists()
 
 
 def test_worker_of_another_version_that_joins_later_is_left_out(tmp_path, reference):
     (tmp_path / "odd.py").write_text(ODD)
-    folder, told, rows = CampaignWriter(reference / "c", read_campaign(reference / "c")), [], []
+    folder, lines, rows = CampaignWriter(reference / "c", read_campaign(reference / "c")), [], []
     tasks = tasks_of(folder.campaign, folder, (), 1, 1)
-    with cluster(tmp_path, 1) as there:
-        executor = DaskExecutor(there.name, None, folder.scenario.parent, report=told.append)
+    with cluster(tmp_path, 1) as opened:
+        executor = DaskExecutor(opened.name, None, folder.scenario.parent, report=lines.append)
 
         def keep(_, result):
             rows.extend(result.rows)
             if len(rows) == 1:
-                there.add_worker(preload=tmp_path / "odd.py")
+                opened.add_worker(preload=tmp_path / "odd.py")
 
         try:
             assert execute(tasks[:1], executor, keep)
-            while not any("left out" in line for line in told):
+            while not any("left out" in line for line in lines):
                 executor.finished(0.1)
             assert execute(tasks[1:], executor, keep)
         finally:
             executor.close()
-    assert "numpy is 1.0" in told[-1]
+    assert "numpy is 1.0" in lines[-1]
     assert len(rows) == 8
     assert len({row["machine_worker"] for row in rows}) == 1
 
 
 def test_worker_takes_the_functions_that_this_machine_has_compiled(tmp_path, monkeypatch):
-    taken = list[bytes]()
-    monkeypatch.setattr(dask, "read_archive", lambda path: taken.append(path.read_bytes()))
+    archives = list[bytes]()
+    monkeypatch.setattr(dask, "read_archive", lambda path: archives.append(path.read_bytes()))
 
     async def set_resources(**resources: int) -> None:
         assert resources == {"campaign": 1}
@@ -264,7 +264,7 @@ def test_worker_takes_the_functions_that_this_machine_has_compiled(tmp_path, mon
         address="", local_directory=tmp_path, log_event=lambda *_: None, set_resources=set_resources, status=None
     )
     asyncio.run(dask.Preparation("campaign", dask.environment(), {dask.KERNELS: b"compiled"}).setup(worker))
-    assert taken == [b"compiled"]
+    assert archives == [b"compiled"]
 
 
 def test_scheduler_out_of_reach_is_one_line(caplog):

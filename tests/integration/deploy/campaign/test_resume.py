@@ -43,7 +43,7 @@ def undisturbed(tmp_path_factory):
 
 
 @pytest.fixture
-def whole(undisturbed, tmp_path, executors):
+def campaign(undisturbed, tmp_path, executors):
     """A copy of it."""
     return copytree(undisturbed, tmp_path / "whole")
 
@@ -62,74 +62,74 @@ def dying_at(monkeypatch, count, error):
     return tried
 
 
-def same(folder, whole):
-    assert rows_in(folder) == rows_in(whole)
-    assert series_in(folder).equals(series_in(whole), null_equal=True)
-    assert sorted(path.name for path in folder.iterdir()) == sorted(path.name for path in whole.iterdir())
+def same(folder, campaign):
+    assert rows_in(folder) == rows_in(campaign)
+    assert series_in(folder).equals(series_in(campaign), null_equal=True)
+    assert sorted(path.name for path in folder.iterdir()) == sorted(path.name for path in campaign.iterdir())
 
 
 @pytest.mark.parametrize("count", range(WRITES))
-def test_whichever_write_was_the_last_nothing_is_lost_or_there_twice(tmp_path, stumbling, whole, monkeypatch, count):
+def test_whichever_write_was_the_last_nothing_is_lost_or_there_twice(tmp_path, stumbling, campaign, monkeypatch, count):
     folder = tmp_path / "died"
     with monkeypatch.context() as patched:
         tried = dying_at(patched, count, Killed())
         with pytest.raises(Killed):
             sweep(stumbling, out=folder, **ASKED)
     assert len(tried) == count + 1
-    before, rows = rows_in(folder), rows_in(whole)
+    before, rows = rows_in(folder), rows_in(campaign)
     assert len(before) == 2 * (count // 2)
     assert all(row in rows for row in before)
     assert resume(folder).is_over
-    same(folder, whole)
+    same(folder, campaign)
 
 
-def test_resume_runs_only_what_is_missing(whole, executors):
-    (whole / "summary.parquet").unlink()
-    assert resume(whole).done == 4
-    assert resume(whole).is_over
+def test_resume_runs_only_what_is_missing(campaign, executors):
+    (campaign / "summary.parquet").unlink()
+    assert resume(campaign).done == 4
+    assert resume(campaign).is_over
     assert [len(executor.tasks) for executor in executors] == [0, 0]
 
 
-def test_failed_runs_stay_unless_they_are_to_be_tried_again(tmp_path, whole):
-    rows = rows_in(whole)
+def test_failed_runs_stay_unless_they_are_to_be_tried_again(tmp_path, campaign):
+    rows = rows_in(campaign)
     failed = [row["run"] for row in rows if row["ended"] == "failed"]
     assert failed
-    assert resume(whole).failed == len(failed)
-    agent = whole / "scenario" / "files" / "stumbling.py"
-    campaign = read_campaign(whole)
+    assert resume(campaign).failed == len(failed)
+    agent = campaign / "scenario" / "files" / "stumbling.py"
+    spec = read_campaign(campaign)
     agent.write_text(agent.read_text().replace("< self.share", "< 0.0"))
     with pytest.raises(BadInput, match="scenario/files/stumbling.py"):
-        resume(whole, retry_failed=True)
-    _say_as_it_is_now(whole, agent)
-    done = resume(whole, retry_failed=True)
+        resume(campaign, retry_failed=True)
+    _say_as_it_is_now(campaign, agent)
+    done = resume(campaign, retry_failed=True)
     assert (done.is_over, done.failed) == (True, 0)
-    assert [row for row in rows_in(whole) if row["run"] not in failed] == [
+    assert [row for row in rows_in(campaign) if row["run"] not in failed] == [
         row for row in rows if row["run"] not in failed
     ]
-    assert set(series_in(whole)["run"]) == set(range(campaign.runs))
-    assert len(series_in(whole)) == 5 * campaign.runs
+    assert set(series_in(campaign)["run"]) == set(range(spec.runs))
+    assert len(series_in(campaign)) == 5 * spec.runs
 
 
 def _say_as_it_is_now(folder, agent):
     import hashlib
 
-    found = json.loads((folder / "campaign.json").read_text())
-    for file in found["files"]:
+    about = json.loads((folder / "campaign.json").read_text())
+    for file in about["files"]:
         if file["path"].endswith(agent.name):
             file["sha256"] = hashlib.sha256(agent.read_bytes()).hexdigest()
-    (folder / "campaign.json").write_text(json.dumps(found))
+    (folder / "campaign.json").write_text(json.dumps(about))
 
 
-def test_other_code_and_versions_are_refused_unless_people_insist(whole):
-    found = json.loads((whole / "campaign.json").read_text())
-    for key, value, told in (
-        ("modules", {**found["modules"], "swarmwire.world": "0"}, "swarmwire.world"),
-        ("versions", {**found["versions"], "numpy": "1.0"}, r"numpy.* 1\.0"),
+def test_other_code_and_versions_are_refused_unless_people_insist(campaign):
+    about = json.loads((campaign / "campaign.json").read_text())
+    for key, value, text in (
+        ("modules", {**about["modules"], "swarmwire.world": "0"}, "swarmwire.world"),
+        ("versions", {**about["versions"], "numpy": "1.0"}, r"numpy.* 1\.0"),
     ):
-        (whole / "campaign.json").write_text(json.dumps({**found, key: value}))
-        with pytest.raises(BadInput, match=f"^--resume {whole}: .*{told}.*--force"):
-            resume(whole)
-        assert resume(whole, force=True).is_over
+        (campaign / "campaign.json").write_text(json.dumps({**about, key: value}))
+        with pytest.raises(BadInput, match=f"^--resume {campaign}: .*{text}.*--force"):
+            resume(campaign)
+        assert resume(campaign, force=True).is_over
 
 
 @pytest.mark.parametrize("text", [None, "{", "[]", '{"format": 1}', '{"format": 2}'])
@@ -141,20 +141,20 @@ def test_folder_without_a_campaign_is_refused_in_a_line(tmp_path, text):
     assert "\n" not in str(refused.value)
 
 
-def test_campaign_folder_is_for_one_process_at_a_time(whole):
-    with folder_lock(whole, "campaign"), pytest.raises(BadInput, match="another process is at work"):
-        resume(whole)
+def test_campaign_folder_is_for_one_process_at_a_time(campaign):
+    with folder_lock(campaign, "campaign"), pytest.raises(BadInput, match="another process is at work"):
+        resume(campaign)
 
 
 def test_full_disk_loses_no_finished_runs_of_a_sweep(tmp_path, scenario, executors, monkeypatch):
     folder, count = tmp_path / "c", 3
     with monkeypatch.context() as patched:
         dying_at(patched, count, FULL)
-        with pytest.raises(StorageFailed) as told:
+        with pytest.raises(StorageFailed) as error:
             sweep(scenario, out=folder, **ASKED)
-    assert str(told.value).startswith(f"{folder}: ")
-    assert "No space left on device" in str(told.value)
-    assert str(told.value).endswith(f"swarmwire sweep --resume {folder}")
+    assert str(error.value).startswith(f"{folder}: ")
+    assert "No space left on device" in str(error.value)
+    assert str(error.value).endswith(f"swarmwire sweep --resume {folder}")
     assert len(rows_in(folder)) == 2 * (count // 2)
     assert executors[0].closed
     assert resume(folder).is_over
@@ -210,11 +210,11 @@ def half(sound, tmp_path, executors):
 
 
 def refused(call, *arguments):
-    with pytest.raises(BadInput) as told:
+    with pytest.raises(BadInput) as error:
         call(*arguments)
-    assert "\n" not in str(told.value)
-    assert told.value.expected
-    return told.value
+    assert "\n" not in str(error.value)
+    assert error.value.expected
+    return error.value
 
 
 def at(error):
@@ -239,17 +239,17 @@ def faults_told(calls, *arguments):
 
 
 @settings(max_examples=12)  # each copies a folder; what is read of one file has a test beside `read_whole`
-@given(of=st.data())
-def test_wherever_a_file_is_damaged_one_line_names_it_or_nothing_is_wrong(sound, tmp_path_factory, of):
-    file = of.draw(st.sampled_from(sorted(path.relative_to(sound) for path in sound.rglob("*.parquet"))))
-    data = of.draw(damaged((sound / file).read_bytes()))
+@given(draws=st.data())
+def test_wherever_a_file_is_damaged_one_line_names_it_or_nothing_is_wrong(sound, tmp_path_factory, draws):
+    file = draws.draw(st.sampled_from(sorted(path.relative_to(sound) for path in sound.rglob("*.parquet"))))
+    data = draws.draw(damaged((sound / file).read_bytes()))
     folder = copytree(sound / file.parts[0], tmp_path_factory.mktemp("damaged") / file.parts[0])
     (folder.parent / file).write_bytes(data)
     tables = [str(path) for path in folder.rglob("*.parquet")]
-    read, again = lambda of: CampaignFolder(of).runs, lambda of: CampaignRun(of, 1)._before()
-    for told in faults_told((read, again, taken_up), folder):
-        assert told.where in tables
-        assert "\n" not in str(told)
+    read, again = lambda path: CampaignFolder(path).runs, lambda path: CampaignRun(path, 1)._before()
+    for error in faults_told((read, again, taken_up), folder):
+        assert error.where in tables
+        assert "\n" not in str(error)
 
 
 @pytest.mark.parametrize("data", [b"", b"PAR1", b"PAR1" + b"x" * 400 + b"PAR1"])  # none is a whole Parquet file
@@ -324,9 +324,9 @@ def test_campaign_json_with_an_invalid_key_is_refused(untouched, key, value):
 
 def test_campaign_json_without_any_one_key_is_refused(untouched):
     about = untouched / "campaign.json"
-    found = json.loads(about.read_text())
-    for key in found:
-        about.write_text(json.dumps({name: value for name, value in found.items() if name != key}))
+    content = json.loads(about.read_text())
+    for key in content:
+        about.write_text(json.dumps({name: value for name, value in content.items() if name != key}))
         assert refused(read_campaign, untouched).where == str(about)
 
 
@@ -347,8 +347,8 @@ def test_summary_beside_unreadable_parts_is_kept(untouched):
 
 def test_package_that_is_no_longer_installed_counts_as_changed(untouched):
     about = untouched / "campaign.json"
-    found = json.loads(about.read_text())
-    about.write_text(json.dumps({**found, "modules": {**found["modules"], "gone_away": "0"}}))
+    content = json.loads(about.read_text())
+    about.write_text(json.dumps({**content, "modules": {**content["modules"], "gone_away": "0"}}))
     assert "gone_away" in str(refused(resume, untouched))
     (change,) = CampaignRun(untouched, 0).run().changes
     assert "gone_away" in change

@@ -81,15 +81,15 @@ def test_series_hold_each_ticks_metrics(reference):
 
 
 def test_campaign_folder_says_what_was_run_and_holds_nothing_else(reference):
-    found = json.loads((reference / "c" / "campaign.json").read_text())
+    about = json.loads((reference / "c" / "campaign.json").read_text())
     assert sorted(path.name for path in (reference / "c").iterdir()) == [
         "campaign.json", "scenario", "series", "summary.parquet"
     ]  # fmt: skip
-    assert found["format"] == 1
-    assert found["vary"] == {"radio.loss": [0.0, 0.8], "robots.pair.count": [2, 3]}
-    assert found["points"][2] == {"radio.loss": 0.8, "robots.pair.count": 2}
-    assert found["seeds"] == [1, 2, 3]
-    assert (found["design"], found["scenario"], found["name"]) == ("grid", "two robots", "two robots")
+    assert about["format"] == 1
+    assert about["vary"] == {"radio.loss": [0.0, 0.8], "robots.pair.count": [2, 3]}
+    assert about["points"][2] == {"radio.loss": 0.8, "robots.pair.count": 2}
+    assert about["seeds"] == [1, 2, 3]
+    assert (about["design"], about["scenario"], about["name"]) == ("grid", "two robots", "two robots")
     assert (reference / "c" / "scenario" / "scenario.toml").exists()
 
 
@@ -124,14 +124,14 @@ def test_chosen_seeds_are_recorded_in_full(tmp_path, scenario, executors):
 
 
 def test_recorded_runs_are_local_and_last_where_workers_cannot_write_here(tmp_path, scenario, monkeypatch):
-    done_by, there, local = list[tuple[str, int]](), InThisProcess(), InThisProcess()
-    there.records = False
-    for name, executor in (("there", there), ("local", local)):
+    done_by, remote, local = list[tuple[str, int]](), InThisProcess(), InThisProcess()
+    remote.records = False
+    for name, executor in (("there", remote), ("local", local)):
         monkeypatch.setattr(executor, "submit", noting(executor.submit, name, done_by))
-    monkeypatch.setattr(sweeping, "open_executor", lambda name, *_: local if name == "local" else there)
+    monkeypatch.setattr(sweeping, "open_executor", lambda name, *_: local if name == "local" else remote)
     sweep(scenario, seeds=3, out=tmp_path / "c", record_seeds=[2], batch=1, executor="there://")
     assert done_by == [("there", 1), ("there", 3), ("local", 2)]
-    assert (there.closed, local.closed) == (True, True)
+    assert (remote.closed, local.closed) == (True, True)
     assert [path.name for path in (tmp_path / "c" / "runs").iterdir()] == ["run-000001"]
     assert [row["ended"] for row in rows_in(tmp_path / "c")] == ["duration"] * 3
 
@@ -166,7 +166,11 @@ def test_arenas_that_stop_and_times_of_metrics_are_the_same_packed_and_alone(tmp
         assert (row["ended"] == "duration") == (row["ticks"] == 10)
     lengths = series_in(tmp_path / "packed").group_by("run").len().sort("run")["len"].to_list()
     assert lengths == [row["ticks"] for row in rows]
-    times = {of.column: of.kind for of in read_campaign(tmp_path / "packed").responses if of.kind == "time"}
+    times = {
+        response.column: response.kind
+        for response in read_campaign(tmp_path / "packed").responses
+        if response.kind == "time"
+    }
     assert times == {"stop_time_s": "time", "aggregation_time_s": "time"}
     assert list(rows[0])[3:10] == [
         "ended", "error", "ticks", "sim_time_s", "trajectory_sha256", "stop_time_s", "stopped_by"
@@ -237,18 +241,22 @@ def test_sweep_prints_what_it_did_and_what_to_do_next(tmp_path, scenario, typed)
         "sweep", scenario, "--vary", "radio.loss=0:0.5:2", "--seeds", "3", "--set", "duration_s=0.3", "--out", folder
     )  # fmt: skip
     assert (code, errors) == (0, "")
-    for said in ("two robots: 2 points x 3 seeds = 6 runs", "6/6 runs", f"swarmwire report {folder}"):
-        assert said in out
+    for text in ("two robots: 2 points x 3 seeds = 6 runs", "6/6 runs", f"swarmwire report {folder}"):
+        assert text in out
     assert out.endswith(f"swarmwire repeat {folder} --run 5\n")
-    found = json.loads((folder / "campaign.json").read_text())
-    assert found["command"].startswith(f"swarmwire sweep {scenario} --vary radio.loss=0:0.5:2 --seeds 3")
-    assert found["overrides"] == ["duration_s=0.3"]
+    about = json.loads((folder / "campaign.json").read_text())
+    assert about["command"].startswith(f"swarmwire sweep {scenario} --vary radio.loss=0:0.5:2 --seeds 3")
+    assert about["overrides"] == ["duration_s=0.3"]
     assert {row["ticks"] for row in rows_in(folder)} == {3}
 
 
 def test_seeds_mean_the_same_to_run_to_sweep_and_in_a_campaigns_file(tmp_path, scenario, typed):
-    asked = (scenario, "--seeds", "2", "--set", "duration_s=0.1", "--quiet", "--out")
-    assert typed("run", *asked, tmp_path / "run", "--no-rrd")[0] == typed("sweep", *asked, tmp_path / "sweep")[0] == 0
+    arguments = (scenario, "--seeds", "2", "--set", "duration_s=0.1", "--quiet", "--out")
+    assert (
+        typed("run", *arguments, tmp_path / "run", "--no-rrd")[0]
+        == typed("sweep", *arguments, tmp_path / "sweep")[0]
+        == 0
+    )
     (tmp_path / "file.toml").write_text(f'format = 1\nscenario = "{scenario.name}"\nseeds = 2\nrecord_seeds = "2"\n')
     of_file = spec_in(tmp_path / "file.toml", campaign_file(tmp_path / "file.toml"))
     assert of_file.seeds == of_file.record_seeds == (1, 2)
@@ -271,7 +279,7 @@ def test_campaign_file_means_the_same_as_options_which_override_it(tmp_path, sce
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "message"),
     [
         ("secnario = 'two.toml'", "secnario: "),
         ("format = 2", "format: "),
@@ -282,19 +290,19 @@ def test_campaign_file_means_the_same_as_options_which_override_it(tmp_path, sce
         ("overrides = [3]", r"overrides\[0\]: "),
     ],
 )
-def test_campaign_file_that_is_invalid_is_refused_in_a_line(tmp_path, scenario, typed, line, told):
+def test_campaign_file_that_is_invalid_is_refused_in_a_line(tmp_path, scenario, typed, line, message):
     keys = {"format": "1", "scenario": "'two.toml'", "seeds": "2"} | dict([line.split(" = ", 1)])
     file = tmp_path / "campaign.toml"
     file.write_text("\n".join(f"{key} = {value}" for key, value in keys.items()))
     code, _, errors = typed("sweep", file, "--out", tmp_path / "c")
     assert code == 2
-    assert re.match(f"error: (.*campaign.toml: )?{told}", errors), errors
+    assert re.match(f"error: (.*campaign.toml: )?{message}", errors), errors
     assert errors.count("\n") == 1
     assert not (tmp_path / "c").exists()
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ([], "SCENARIO: is missing"),
         (["two.toml"], "--seeds: is missing"),
@@ -305,12 +313,14 @@ def test_campaign_file_that_is_invalid_is_refused_in_a_line(tmp_path, scenario, 
         (["two.toml", "--seeds", "2", "--record-seeds", "9"], "--record-seeds: "),
     ],
 )
-def test_sweep_options_that_are_invalid_are_refused_in_a_line(tmp_path, scenario, typed, monkeypatch, arguments, told):
+def test_sweep_options_that_are_invalid_are_refused_in_a_line(
+    tmp_path, scenario, typed, monkeypatch, arguments, message
+):
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
     code, out, errors = typed("sweep", *arguments)
     assert (code, out) == (2, "")
-    assert re.match(f"error: {told}", errors), errors
+    assert re.match(f"error: {message}", errors), errors
     assert errors.count("\n") == 1
     assert sorted(tmp_path.iterdir()) == before
 

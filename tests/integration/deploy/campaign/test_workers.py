@@ -21,10 +21,10 @@ VARY = {"radio.loss": [0.0, 0.5]}
 DEADLY = 2  # one of the seeds that stumble
 
 
-def same(folder, whole):
+def same(folder, reference):
     """The same rows and series."""
-    assert rows_in(folder) == rows_in(whole)
-    assert series_in(folder).equals(series_in(whole), null_equal=True)
+    assert rows_in(folder) == rows_in(reference)
+    assert series_in(folder).equals(series_in(reference), null_equal=True)
 
 
 def ignored(*_):
@@ -133,10 +133,10 @@ def test_campaign_that_is_killed_leaves_no_worker_and_can_be_resumed(tmp_path, e
         workers = psutil.Process(process.pid).children(recursive=True)
         assert len(workers) == 1
         process.kill()
-        gone, alive = psutil.wait_procs(workers, timeout=60)
-    assert (len(gone), alive) == (1, [])
-    there = rows_in(folder)
-    assert 2 <= len(there) <= 8
+        ended, alive = psutil.wait_procs(workers, timeout=60)
+    assert (len(ended), alive) == (1, [])
+    rows = rows_in(folder)
+    assert 2 <= len(rows) <= 8
     assert resume(folder).is_over
     sweep(scenario, seeds=4, vary=VARY, out=tmp_path / "whole")
     same(folder, tmp_path / "whole")
@@ -144,9 +144,9 @@ def test_campaign_that_is_killed_leaves_no_worker_and_can_be_resumed(tmp_path, e
 
 def test_worker_ends_with_its_campaign_also_in_the_middle_of_a_run(tmp_path):
     """Of runs of half a second, and of a day, which would take minutes."""
-    asked = (str(scenario_in(tmp_path)), str(tmp_path / "c"), "duration_s", "0.5", "100000.0")
+    arguments = (str(scenario_in(tmp_path)), str(tmp_path / "c"), "duration_s", "0.5", "100000.0")
     with subprocess.Popen(
-        [sys.executable, "-c", KILLED, *asked], stdout=subprocess.PIPE, text=True, cwd=ROOT
+        [sys.executable, "-c", KILLED, *arguments], stdout=subprocess.PIPE, text=True, cwd=ROOT
     ) as process:
         try:
             assert process.stdout is not None

@@ -208,11 +208,11 @@ def test_observers_receive_the_truth(folder, opened):
         closed_after(open_observed(LISTEN, as_name(folder, "world"), observers_access(SEEN, ACCESS)))
     )
     endpoint = listens_at(world)[0]
-    seen: queue.SimpleQueue[str] = queue.SimpleQueue()
+    keys: queue.SimpleQueue[str] = queue.SimpleQueue()
     for name in ("a", "wall"):
         session = opened.enter_context(closed_after(open_observer(endpoint, as_name(folder, name))))
-        session.declare_subscriber(SEEN.truth, at_once(lambda _, name=name: seen.put(name)))
+        session.declare_subscriber(SEEN.truth, at_once(lambda _, name=name: keys.put(name)))
     wait_for_listeners(world, SEEN.truth)
     world.put(SEEN.truth, b"glimpse", congestion_control=BLOCK)
-    assert seen.get(timeout=WITHIN_S) == "wall"
-    assert seen.empty()
+    assert keys.get(timeout=WITHIN_S) == "wall"
+    assert keys.empty()

@@ -79,9 +79,9 @@ def test_ctl_finds_changes_and_kills_in_a_run_that_is_repeated(tmp_path, process
     assert "event 0 ends" in ctl("end", 0)
     ctl("step", 5)
     until(status, lambda status: status["state"] == "paused" and status["tick"] == tick + 25)
-    told = ctl("status")
-    assert "20 of 20 alive" in told
-    assert "2 ready, 0 lost" in told
+    output = ctl("status")
+    assert "20 of 20 alive" in output
+    assert "2 ready, 0 lost" in output
     process.kill()
     process.communicate()
     assert ctl("status").startswith("no run ")
@@ -231,7 +231,7 @@ def controls() -> Controls:
 @pytest.fixture
 def endpoint(certs, controls) -> Iterator[str]:
     """Where the run `r`, which takes nothing but what controls know, is controlled from elsewhere."""
-    metrics, keys, of = Metrics(), ObserverKeys("r"), member("world", certs=certs)
+    metrics, keys, member_of_run = Metrics(), ObserverKeys("r"), member("world", certs=certs)
     status = Status(
         run_id="r",
         scenario="s",
@@ -245,12 +245,14 @@ def endpoint(certs, controls) -> Iterator[str]:
         events=list,
     )
     status.begin(static(2))
-    assert of.access is not None
-    with closed_after(open_observed("tls/127.0.0.1:0", of.network, observers_access(keys, of.access))) as session:
-        kept = ControlServer(status, controls, lambda _: 0, lambda _: None, lambda _: None).declare(session, keys)
+    assert member_of_run.access is not None
+    with closed_after(
+        open_observed("tls/127.0.0.1:0", member_of_run.network, observers_access(keys, member_of_run.access))
+    ) as session:
+        server = ControlServer(status, controls, lambda _: 0, lambda _: None, lambda _: None).declare(session, keys)
         token = session.liveliness().declare_token(keys.published)
         yield listens_at(session)[0]
-        del kept, token
+        del server, token
 
 
 def test_operator_controls_a_run_and_an_observer_only_looks(certs, controls, endpoint, monkeypatch):
@@ -289,9 +291,9 @@ def test_ctl_takes_a_folder_of_certificates(certs, controls, endpoint):
         catch_exceptions=False,
     )
     assert called.output.startswith("3 ticks")
-    told = CliRunner().invoke(
+    status = CliRunner().invoke(
         app, ["ctl", "--run", "r", "--endpoint", endpoint, "--certs", str(certs), "status"], catch_exceptions=False
     )
-    assert "tick      0 of 9" in told.output
+    assert "tick      0 of 9" in status.output
     with pytest.raises(SwarmwireError, match="--endpoint: expected --certs with"):
         CliRunner().invoke(app, ["ctl", "--endpoint", endpoint, "status"], catch_exceptions=False)

@@ -166,9 +166,9 @@ def test_deploy_over_a_cut_connection_leaves_the_robot_unchanged(fleet, robots, 
 
 def test_deploy_removes_remains_of_an_interrupted_deployment(fleet, robots):
     host = fleet.add("flock-0")
-    left = host.root / "flock-0" / "releases" / "0123456789ab.part"
-    left.mkdir(parents=True)
-    (left / "robot.toml").touch()
+    remains = host.root / "flock-0" / "releases" / "0123456789ab.part"
+    remains.mkdir(parents=True)
+    (remains / "robot.toml").touch()
     (host.root / "env" / "ba9876543210.part").mkdir(parents=True)
     assert robots("deploy")[0] == 0
     assert host.parts() == []

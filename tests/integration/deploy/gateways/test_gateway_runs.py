@@ -105,7 +105,7 @@ def test_gateway_run_keeps_its_speed_as_outside_programs_rely_on_it(scenario, sc
 def test_dead_robots_are_published_as_dead_to_gateways(scenario, scripted) -> None:
     kill = ["events=[{at_s=0.5, do='kill', robots={group='other', count=1}}]", "duration_s=1"]
     run(scenario, gateways={"other": "scripted"}, realtime=FAST, overrides=kill)
-    assert [told.alive.sum() for told in scripted[0].published] == [3] * 5 + [2] * 5
+    assert [state.alive.sum() for state in scripted[0].published] == [3] * 5 + [2] * 5
 
 
 def test_command_line_prints_a_line_for_each_robot_that_can_be_driven(
@@ -128,8 +128,8 @@ def test_body_that_differs_from_the_emulated_robot_is_reported_at_the_start(
     scenario, scripted, capsys, monkeypatch
 ) -> None:
     with Simulation(scenario, gateways={"own": "scripted"}, realtime=FAST):
-        told = capsys.readouterr().err.splitlines()
-    assert told[0].startswith("own: body epuck2 as scripted: no program receives its scan, ")
+        lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith("own: body epuck2 as scripted: no program receives its scan, ")
     monkeypatch.setattr(ScriptedGateway, "differences", lambda _: ())
     with Simulation(scenario, gateways={"own": "scripted"}, realtime=FAST):
         assert "as scripted" not in capsys.readouterr().err
@@ -203,12 +203,12 @@ def test_people_are_told_whom_nobody_drives(scenario, scripted, tmp_path, capsys
         simulation.run(15)
         early = [line for line in capsys.readouterr().err.splitlines() if "no program dr" in line]
     late = [line for line in capsys.readouterr().err.splitlines() if "no program dr" in line]
-    names = [f"other-{place}" for place in range(3) if place not in driven]
+    names = [f"other-{index}" for index in range(3) if index not in driven]
     if not names:
         assert early == late == []
         return
-    rest = f"{', '.join(names)}: swarmwire-agent run --config {out}/robots/{names[0]}.toml and so on"
-    assert (early, late) == ([f"no program drives {rest}"], [f"no program drove {rest}"])
+    commands = f"{', '.join(names)}: swarmwire-agent run --config {out}/robots/{names[0]}.toml and so on"
+    assert (early, late) == ([f"no program drives {commands}"], [f"no program drove {commands}"])
 
 
 def test_undriven_robots_are_reported_after_wall_time_not_simulated_time(scenario, scripted, capsys) -> None:

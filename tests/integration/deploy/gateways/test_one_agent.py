@@ -15,7 +15,7 @@ MAX_MISSED = 0.1  # of the ticks: a machine that did not keep up tells nothing o
 @pytest.mark.parametrize("name", CASES)
 def test_robots_driven_through_their_protocol_come_to_what_emulated_ones_do(name: str) -> None:
     expected = emulated(CASES[name], DURATION_S)
-    found, missed = through_gateway(CASES[name], DURATION_S, SEED)
+    values, missed = through_gateway(CASES[name], DURATION_S, SEED)
     if missed > MAX_MISSED:
         pytest.skip(f"{missed:.0%} of the ticks missed: that tells of this machine, not of robots")
-    assert not outside(found, expected, tuple(found)), found
+    assert not outside(values, expected, tuple(values)), values

@@ -52,8 +52,8 @@ def spread(behaviour: str, body: str) -> dict[str, FloatArray]:
     """What runs with all agents in this process come to, by name, a number for each seed."""
     speeds, overrides = Speeds(), CASES[behaviour].overrides
     arenas = run(scenario(behaviour, body), seeds=SEEDS, overrides=overrides, observers=[speeds]).arenas
-    found = [measured(arena, speeds.of(place)) for place, arena in enumerate(arenas)]
-    return {name: np.array([of[name] for of in found]) for name in found[0]}
+    results = [measured(arena, speeds.of(index)) for index, arena in enumerate(arenas)]
+    return {name: np.array([measures[name] for measures in results]) for name in results[0]}
 
 
 def through_gateway(
@@ -85,8 +85,8 @@ def through_gateway(
 )
 def test_agents_through_a_gateway_come_to_what_emulated_ones_do(behaviour, body, tmp_path) -> None:
     expected = spread(behaviour, body)
-    found, result = through_gateway(behaviour, body, tmp_path)
-    assert not outside(found, expected, CASES[behaviour].judged), (found, result.realtime, result.counts)
+    measures, result = through_gateway(behaviour, body, tmp_path)
+    assert not outside(measures, expected, CASES[behaviour].judged), (measures, result.realtime, result.counts)
 
 
 @pytest.mark.parametrize(
@@ -95,14 +95,14 @@ def test_agents_through_a_gateway_come_to_what_emulated_ones_do(behaviour, body,
 )
 def test_driver_that_turns_the_wrong_way_is_outside_the_spread(behaviour, body, tmp_path) -> None:
     expected = spread(behaviour, body)
-    found, _ = through_gateway(behaviour, body, tmp_path, broken=True)
-    assert outside(found, expected, CASES[behaviour].judged), found
+    measures, _ = through_gateway(behaviour, body, tmp_path, broken=True)
+    assert outside(measures, expected, CASES[behaviour].judged), measures
 
 
 def test_flock_over_the_robots_own_network_matches_an_emulated_one(tmp_path) -> None:
     """Range and bearing are from poses that the run tells as a tracker would."""
     expected = spread("flocking", "epuck2")
-    found, result = through_gateway("flocking", "epuck2", tmp_path, radio="zenoh")
-    assert not outside(found, expected, CASES["flocking"].judged), (found, result.realtime, result.counts)
+    measures, result = through_gateway("flocking", "epuck2", tmp_path, radio="zenoh")
+    assert not outside(measures, expected, CASES["flocking"].judged), (measures, result.realtime, result.counts)
     assert result.radio is not None
     assert result.radio.sent == 0, "the medium of the run carried nothing"

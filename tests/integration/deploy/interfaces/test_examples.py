@@ -241,15 +241,15 @@ def test_dds_participants_discover_one_another_and_exchange(tmp_path):
 def hops(world: InterfacesRun, to: str) -> list[str]:
     """Addresses of the robots over which line-0 reaches another, in order; none if it does not."""
     route: list[str] = []
-    here = "line-0"
+    robot = "line-0"
     names = {world.address(name): name for name in world.robots}
-    while here != to:
-        found = world.on(here, "ip", "route", "get", world.address(to)).stdout
-        via = re.search(r"via ([\d.]+)", found)
-        here = names[via[1]] if via else to
-        if here in route:
+    while robot != to:
+        route_text = world.on(robot, "ip", "route", "get", world.address(to)).stdout
+        via = re.search(r"via ([\d.]+)", route_text)
+        robot = names[via[1]] if via else to
+        if robot in route:
             return []  # a loop while routes change
-        route.append(here)
+        route.append(robot)
     return route
 
 
@@ -261,7 +261,7 @@ def test_babeld_routes_over_many_hops_and_around_a_dead_robot(tmp_path):
     with running(tmp_path, scenario + DISK) as world:
         far = world.address("line-8")
         until(lambda: world.on("line-0", "ping", "-c", "1", "-W", "1", far).returncode == 0)
-        route = until(lambda: hops(world, "line-8"), lambda found: len(found) == 8)
+        route = until(lambda: hops(world, "line-8"), lambda addresses: len(addresses) == 8)
         on_way = next(name for name in route if name in ("line-4", "line-9"))
         other = "line-9" if on_way == "line-4" else "line-4"
         assert swarmwire("ctl", "--run", world.folder, "kill", on_way).returncode == 0

@@ -90,9 +90,9 @@ def test_ros_nodes_find_the_router_of_their_robot_and_no_node_of_another(tmp_pat
         for own, other in (("line_0", "line_1"), ("line_1", "line_0")):
             robot = own.replace("_", "-")
             until(lambda robot=robot: world.on(robot, *look, "node_of/*").stdout == f"node_of/{robot}\n")
-            seen = world.on(robot, *look, "@ros2_lv/**").stdout
-            assert f"%{own}" in seen
-            assert other not in seen
+            output = world.on(robot, *look, "@ros2_lv/**").stdout
+            assert f"%{own}" in output
+            assert other not in output
         world.end()
     assert (turned_rad(world.folder) > 0.5).all(), world.output("line-0")
 

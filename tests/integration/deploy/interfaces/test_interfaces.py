@@ -111,13 +111,15 @@ def test_killed_world_leaves_neither_processes_nor_devices(tmp_path):
         sleeper = subprocess.Popen(
             world.command("line-1", "sh", "-c", "sleep 1000 & (setsid sleep 1000 &) ; sleep 1000")
         )
-        inside = until(lambda: psutil.Process(sleeper.pid).children(recursive=True), lambda found: len(found) >= 5)
+        inside = until(
+            lambda: psutil.Process(sleeper.pid).children(recursive=True), lambda children: len(children) >= 5
+        )
         os.kill(world.process.pid, signal.SIGKILL)
         assert sleeper.wait(60) == 128 + signal.SIGKILL
         until(lambda: not any(process.is_running() for process in inside))
     assert not any(name.startswith("radio") for _, name in socket.if_nameindex())
-    left = {path.name for path in (tmp_path / "out").iterdir()}
-    assert INTERFACES in left
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert INTERFACES in names
     late = world.on("line-0", "true")
     assert (late.returncode, late.stderr) == (125, "error: the run is over\n")
 

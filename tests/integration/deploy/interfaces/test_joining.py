@@ -61,13 +61,13 @@ def joined(**entries: str) -> tuple[str, str]:
     return "--set", f"radio.interface.join={{ {table} }}"
 
 
-def reaches(place: ExistingNamespace, to: str) -> bool:
-    return place.on("ping", "-c", "3", "-i", "0.1", "-W", "2", to).returncode == 0
+def reaches(namespace: ExistingNamespace, to: str) -> bool:
+    return namespace.on("ping", "-c", "3", "-i", "0.1", "-W", "2", to).returncode == 0
 
 
 @pytest.mark.parametrize("options", [(), ("--runners", "2")])
 def test_joined_namespaces_talk_over_the_radio_and_have_their_own_devices_only_after_the_run(tmp_path, places, options):
-    before = [place.state() for place in (places.named, places.process, places.container)]
+    before = [namespace.state() for namespace in (places.named, places.process, places.container)]
     join = joined(line_1=f"netns:{places.name}", line_2=f"pid:{places.process.pid}", line_3="container:px4-{index}")
     with running(tmp_path, line(4) + DISK, "--packets", "all", *join, *options) as world:
         addresses = [world.address(f"line-{robot}") for robot in range(4)]
@@ -80,7 +80,7 @@ def test_joined_namespaces_talk_over_the_radio_and_have_their_own_devices_only_a
         assert places.named.on(sys.executable, "-c", BROADCAST).returncode == 0
         assert reaches(places.named, addresses[0])  # what was broadcast before has arrived
         summary = world.end()
-    assert [place.state() for place in (places.named, places.process, places.container)] == before
+    assert [namespace.state() for namespace in (places.named, places.process, places.container)] == before
     packets = RunFolder(world.folder).packets()
     frames = packets.filter((packets["topic"] == "frame") & (packets["size_bytes"] == DATA_BYTES + HEADERS_BYTES))
     fates = Counter(zip(*(frames[name].to_list() for name in ("sender", "receiver", "fate")), strict=True))
@@ -154,7 +154,7 @@ def test_routes_to_groups_lead_to_the_radio_unless_a_namespace_has_a_default_rou
     places.process.ip("route", "add", "default", "via", "192.0.2.9")
     join = joined(line_0=f"netns:{places.name}", line_1=f"pid:{places.process.pid}")
     with running(tmp_path, line(2) + DISK, *join) as world:
-        shown = [place.ip("route") for place in (places.named, places.process)]
+        shown = [namespace.ip("route") for namespace in (places.named, places.process)]
         assert [all(f"{route} dev radio0" in routes for route in ROUTES) for routes in shown] == [True, False]
         assert "default via 192.0.2.9 dev own0" in shown[1]
         places.named.ip("link", "set", "radio0", "down")
@@ -195,10 +195,10 @@ def refusal(folder: Path, entries: str, entry: str, expected: str) -> None:
 def test_namespaces_that_do_not_exist_are_refused_before_the_run(tmp_path, places):
     refusal(tmp_path, 'line-0 = "netns:none"', "line-0", "expected a network namespace in /run/netns")
     refusal(tmp_path, 'line-1 = "pid:4194305"', "line-1", "expected a running process of this machine")
-    known = "expected a running container that docker or podman of this machine knows"
-    unknown = f"{known} (Error: No such container: px4-0; Error: No such container: px4-0); got container:px4-0"
+    container = "expected a running container that docker or podman of this machine knows"
+    unknown = f"{container} (Error: No such container: px4-0; Error: No such container: px4-0); got container:px4-0"
     refusal(tmp_path, 'line = "container:px4-{index}"', "line", unknown)
-    refusal(tmp_path, 'line-0 = "container:stopped"', "line-0", f"{known} (it does not run; Error: No such")
+    refusal(tmp_path, 'line-0 = "container:stopped"', "line-0", f"{container} (it does not run; Error: No such")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PATH", str(tmp_path / "none"))
         refusal(tmp_path, 'line-0 = "container:px4-3"', "line-0", "expected docker or podman on PATH")

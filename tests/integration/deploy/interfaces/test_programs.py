@@ -45,8 +45,8 @@ def test_programs_that_fail_alike_are_reported_once_with_the_last_line(tmp_path)
     script = 'echo starting; echo "no map of $ROBOT"; test $ROBOT = line-2 || exit 7'
     scenario = with_program(line(3), "sh", "-c", script).replace("3600", "2") + DISK
     with running(tmp_path, scenario) as world:
-        said, _ = world.process.communicate(timeout=60)
-    (report,) = [told for told in said.splitlines() if told.startswith("the program of ")]
+        output, _ = world.process.communicate(timeout=60)
+    (report,) = [text for text in output.splitlines() if text.startswith("the program of ")]
     assert re.fullmatch(r"the program of (line-[01]) ended \(exit code 7\): no map of \1", report)
 
 
@@ -61,7 +61,7 @@ def test_program_dies_with_its_robot_and_starts_when_it_is_revived(tmp_path):
     with running(tmp_path, with_program(line(2), "sh", "-c", script) + DISK + kill) as world:
         until(lambda: world.output("line-0").count("started") == 2)
         assert world.output("line-1").count("started") == 1
-        sleepers = until(lambda: sleepers_of(world.process.pid), lambda found: len(found) == 2)
+        sleepers = until(lambda: sleepers_of(world.process.pid), lambda processes: len(processes) == 2)
         os.kill(world.process.pid, signal.SIGKILL)
         until(lambda: not any(process.is_running() for process in sleepers))
 

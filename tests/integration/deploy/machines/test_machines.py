@@ -48,13 +48,13 @@ def test_machines_with_a_router_between_run_as_one_process_does(tmp_path):
     with machines(3) as (far, between, near):
         certs = lab(tmp_path / "ca", {"world": far.addresses, "gate": between.addresses}, "r1", "r2")
         at, through = (f"tls/{address}:7447" for address in (far.addresses[0], between.addresses[1]))
-        out, given = tmp_path / "out", ("--certs", certs)
+        out, options = tmp_path / "out", ("--certs", certs)
         with (
-            on(between, "router", "--listen", through, "--connect", at, *given) as router,
-            on(far, "world", LOSSY, "--set", SHORT, "--listen", at, "--out", out, "--no-rrd", *given) as world,
+            on(between, "router", "--listen", through, "--connect", at, *options) as router,
+            on(far, "world", LOSSY, "--set", SHORT, "--listen", at, "--out", out, "--no-rrd", *options) as world,
         ):
             router.said("linked with world")
-            joined = [on(near, "join", through, "--robots", "10", "--name", name, *given) for name in ("r1", "r2")]
+            joined = [on(near, "join", through, "--robots", "10", "--name", name, *options) for name in ("r1", "r2")]
             with joined[0] as one, joined[1] as other:
                 assert (world.ended(), one.ended(), other.ended()) == (0, 0, 0), (world.lines, one.lines, other.lines)
             assert router.stop() == 0
@@ -173,11 +173,15 @@ class Hostile:
 
     def _ask(self, session: zenoh.Session, world: GuardedWorld) -> None:
         """In others' names, for others' robots, for control and truth: nobody answers; nor is it asked itself."""
-        request, keys, seen = JoinRequest(names=("flock-0",)).encode(), world.keys, world.seen
-        for key in (keys.join("r0"), keys.any_join, seen.control, seen.scene, seen.status):
+        request, keys, observer_keys = JoinRequest(names=("flock-0",)).encode(), world.keys, world.seen
+        for key in (keys.join("r0"), keys.any_join, observer_keys.control, observer_keys.scene, observer_keys.status):
             replies = [reply for reply in session.get(key, payload=request, timeout=20.0) if reply.ok]
             assert replies == [], key
-        for key in (keys.any_join, keys.any_session_info, seen.control):  # only now: it would be asked by itself
+        for key in (
+            keys.any_join,
+            keys.any_session_info,
+            observer_keys.control,
+        ):  # only now: it would be asked by itself
             self._kept.append(session.declare_queryable(key, at_once(self._be_asked)))
 
     def _flood(self, session: zenoh.Session, keys: Keys) -> None:

@@ -125,9 +125,9 @@ class BehindRouter(Joiners):
 @pytest.fixture
 def joiners(tmp_path):
     with ExitStack() as opened:
-        found = BehindRouter(tmp_path, opened)
-        opened.callback(found.close)
-        yield found
+        network = BehindRouter(tmp_path, opened)
+        opened.callback(network.close)
+        yield network
 
 
 def simulation_of(joiners, act, *overrides):
@@ -192,8 +192,8 @@ class BehindGuardedRouter(Joiners):
         if len(self.lost) < len(RUNNERS):
             return
         for name in RUNNERS:
-            code, said = self.said(name)
-            assert (code, said.splitlines()[-1]) == (1, "the world is gone, or out of reach")
+            code, output = self.said(name)
+            assert (code, output.splitlines()[-1]) == (1, "the world is gone, or out of reach")
         self._route()
         for name, robots in self.lost.items():
             self._join(name, "--names", ",".join(robots))

@@ -41,25 +41,27 @@ begin_tune(plan, Path(sys.argv[2]), "", 1, TuneObservers(Watcher(), NoObserver()
 
 @pytest.mark.usefixtures("calculated")
 def test_known_optimum_is_found(tmp_path, scenario):
-    found = tuned(scenario, tmp_path / "t", trials=24, seeds=1)
-    assert found.is_over
-    assert found.best.parameters["metrics.0.at"] == pytest.approx(0.7, abs=0.05)
+    result = tuned(scenario, tmp_path / "t", trials=24, seeds=1)
+    assert result.is_over
+    assert result.best.parameters["metrics.0.at"] == pytest.approx(0.7, abs=0.05)
     rows = trials_in(tmp_path / "t")
     assert rows["trial"].to_list() == list(range(24))
     assert np.allclose(rows["value"], (rows["metrics.0.at"] - 0.7) ** 2)
-    assert found.best.number == rows["value"].arg_min()
+    assert result.best.number == rows["value"].arg_min()
     assert set(rows["state"]) == {"complete"}
 
 
 @pytest.mark.usefixtures("calculated")
 def test_best_trial_is_checked_on_seeds_that_no_trial_had(tmp_path, scenario):
-    found = tuned(scenario, tmp_path / "t", trials=4, seeds=3, check_seeds="5")
-    own, best = (CampaignFolder(tmp_path / "t" / "check" / name) for name in ("baseline", f"trial-{found.best.number}"))
+    result = tuned(scenario, tmp_path / "t", trials=4, seeds=3, check_seeds="5")
+    own, best = (
+        CampaignFolder(tmp_path / "t" / "check" / name) for name in ("baseline", f"trial-{result.best.number}")
+    )
     assert own.about.seeds == best.about.seeds == (4, 5, 6, 7, 8)
     assert own.sample("bowl", 0).value == pytest.approx([0.36] * 5)
-    assert set(best.sample("bowl", 0).value) == {found.best.result.value}
-    of, difference, interval = gained(found.check, found.tuning.goal)
-    assert (of, difference) == ("medians", pytest.approx(found.best.result.value - 0.36))
+    assert set(best.sample("bowl", 0).value) == {result.best.result.value}
+    statistic, difference, interval = gained(result.check, result.tuning.goal)
+    assert (statistic, difference) == ("medians", pytest.approx(result.best.result.value - 0.36))
     assert interval.low == interval.high == pytest.approx(difference)
 
 
@@ -99,7 +101,7 @@ def test_half_written_line_of_a_killed_process_is_no_trial(tmp_path, scenario):
 
 @pytest.mark.usefixtures("calculated")
 def test_time_that_most_runs_do_not_reach_is_worse_than_any_reached(tmp_path, scenario):
-    found = tuned(scenario, tmp_path / "t", "metrics.1.after_s=0.1:0.9", goal="min ready_s", trials=10)
+    result = tuned(scenario, tmp_path / "t", "metrics.1.after_s=0.1:0.9", goal="min ready_s", trials=10)
     rows = trials_in(tmp_path / "t")
     late = rows.filter(pl.col("metrics.1.after_s") > 0.4)
     assert set(late["value"]) == {1.0}
@@ -107,18 +109,18 @@ def test_time_that_most_runs_do_not_reach_is_worse_than_any_reached(tmp_path, sc
     assert set(late["censored"]) == {1.0}
     early = rows.filter(pl.col("metrics.1.after_s") <= 0.4)
     assert all(value <= 0.5 for value in early["value"])
-    assert found.best.result.value == early["value"].min()
+    assert result.best.result.value == early["value"].min()
 
 
 @pytest.mark.usefixtures("calculated")
 def test_changed_files_and_other_code_are_refused(tmp_path, scenario):
     tuned(scenario, tmp_path / "t", trials=2)
     about = tmp_path / "t" / "tuning.json"
-    found = json.loads(about.read_text())
-    about.write_text(json.dumps({**found, "versions": {**found["versions"], "numpy": "1.0"}}))
+    content = json.loads(about.read_text())
+    about.write_text(json.dumps({**content, "versions": {**content["versions"], "numpy": "1.0"}}))
     with pytest.raises(BadInput, match=r"numpy.* 1\.0.*--force"):
         gone_on_with(tmp_path / "t")
-    about.write_text(json.dumps(found))
+    about.write_text(json.dumps(content))
     (tmp_path / "t" / "scenario" / "files" / "careful.py").write_text("x = 1")
     with pytest.raises(BadInput, match="scenario/files/careful.py"):
         gone_on_with(tmp_path / "t")
@@ -136,22 +138,22 @@ def test_folder_without_a_tuning_is_refused_in_a_line(tmp_path, text):
 
 @pytest.mark.usefixtures("executors")
 def test_best_trial_is_a_scenario_that_runs_from_the_folder_alone(tmp_path, scenario):
-    found = tuned(
+    result = tuned(
         scenario, tmp_path / "t", AT, "robots.pair.count=2:4", trials=6, seeds=1, overrides=("duration_s=0.3",)
     )
     shutil.rmtree(tmp_path / "t" / "scenario")
     for file in ("bowl.py", "careful.py", "bowl.toml"):
         (tmp_path / file).unlink()
-    result = run(tmp_path / "t" / "best.toml")
-    assert (result.ticks, result.arenas[0].seed) == (3, 7)
-    assert result.metrics["bowl"].final == found.best.result.value
-    assert result.robots == found.best.parameters["robots.pair.count"]
+    repetition = run(tmp_path / "t" / "best.toml")
+    assert (repetition.ticks, repetition.arenas[0].seed) == (3, 7)
+    assert repetition.metrics["bowl"].final == result.best.result.value
+    assert repetition.robots == result.best.parameters["robots.pair.count"]
 
 
 @pytest.mark.usefixtures("executors")
 def test_trials_that_fail_are_told_of_and_never_the_best(tmp_path, scenario):
     searched = ("robots.pair.params.speed=0:1", AT)
-    found = tuned(scenario, tmp_path / "t", *searched, trials=8, seeds=1)
+    result = tuned(scenario, tmp_path / "t", *searched, trials=8, seeds=1)
     rows = trials_in(tmp_path / "t")
     too_fast = pl.col("robots.pair.params.speed") > 0.5
     failed, complete = rows.filter(too_fast), rows.filter(~too_fast)
@@ -162,18 +164,18 @@ def test_trials_that_fail_are_told_of_and_never_the_best(tmp_path, scenario):
     assert failed["value"].null_count() == len(failed)
     assert all("ValueError: too fast" in error for error in failed["error"])
     assert set(complete["state"]) == {"complete"}
-    assert found.best.parameters["robots.pair.params.speed"] <= 0.5
+    assert result.best.parameters["robots.pair.params.speed"] <= 0.5
 
 
 @pytest.mark.usefixtures("executors")
 def test_values_that_are_invalid_together_fail_their_trial(tmp_path, scenario):
     searched = ("robots.pair.count=2,60", "arena.size_m=[4.0, 4.0],[0.3, 0.3]")
-    found = tuned(scenario, tmp_path / "t", *searched, trials=6, seeds=1)
+    result = tuned(scenario, tmp_path / "t", *searched, trials=6, seeds=1)
     rows = trials_in(tmp_path / "t")
     crowded = (pl.col("robots.pair.count") == "60") & (pl.col("arena.size_m") == "[0.3, 0.3]")
     assert set(rows.filter(crowded)["state"]) == {"failed"}
     assert set(rows.filter(~crowded)["state"]) == {"complete"}
-    assert found.is_over
+    assert result.is_over
 
 
 @pytest.mark.usefixtures("executors")
@@ -183,10 +185,10 @@ def test_choices_may_be_files_which_the_folder_keeps(tmp_path, scenario):
     tuned(scenario, tmp_path / "t", searched, trials=2, seeds=1, until=1, parallel_trials=1)
     for file in ("careful.py", "other.py", "bowl.py"):
         (tmp_path / file).unlink()
-    found = gone_on_with(tmp_path / "t", trials=5)
+    result = gone_on_with(tmp_path / "t", trials=5)
     assert set(trials_in(tmp_path / "t")["robots.pair.agent"]) == {"careful.py:Careful", "other.py:Careful"}
     assert run(tmp_path / "t" / "best.toml").ended == "duration"
-    assert found.is_over
+    assert result.is_over
 
 
 @pytest.fixture
@@ -227,7 +229,7 @@ def test_tune_command_prints_what_it_found_its_worth_and_what_to_do_next(tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ([], "SCENARIO: is missing"),
         (["bowl.toml", "--search", AT], "--goal: is missing"),
@@ -244,12 +246,14 @@ def test_tune_command_prints_what_it_found_its_worth_and_what_to_do_next(tmp_pat
         (["bowl.toml", "--resume", "nowhere"], "SCENARIO: .*--resume"),
     ],
 )
-def test_tune_options_that_are_invalid_are_refused_in_a_line(tmp_path, scenario, typed, monkeypatch, arguments, told):
+def test_tune_options_that_are_invalid_are_refused_in_a_line(
+    tmp_path, scenario, typed, monkeypatch, arguments, message
+):
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
     code, out, errors = typed("tune", *arguments)
     assert (code, out) == (2, "")
-    assert re.match(f"error: {told}", errors), errors
+    assert re.match(f"error: {message}", errors), errors
     assert errors.count("\n") == 1
     assert sorted(tmp_path.iterdir()) == before
 
@@ -305,12 +309,12 @@ def test_tuning_that_is_killed_leaves_no_worker_and_can_be_resumed(tmp_path, typ
         workers = psutil.Process(process.pid).children(recursive=True)
         assert len(workers) == 1
         process.kill()
-        gone, alive = psutil.wait_procs(workers, timeout=60)
-    assert (len(gone), alive) == (1, [])
+        ended, alive = psutil.wait_procs(workers, timeout=60)
+    assert (len(ended), alive) == (1, [])
     code, out, _ = typed("tune", "--resume", folder)
-    there = re.search(r"5 trials x 1 seeds; (\d) of them are there", out)
+    match = re.search(r"5 trials x 1 seeds; (\d) of them are there", out)
     assert code == 0
-    assert there is not None
-    assert int(there[1]) >= 3
+    assert match is not None
+    assert int(match[1]) >= 3
     tuned(scenario, tmp_path / "whole", seeds=1, trials=5, parallel_trials=2)
     assert trials_in(folder).equals(trials_in(tmp_path / "whole"), null_equal=True)
