@@ -77,7 +77,7 @@ def test_machines_page_commands_run_as_shown(page, tmp_path, monkeypatch, capsys
             command = on[typed.machine].command(*shell(typed.line, folders[typed.machine]))
             started.append(opened.enter_context(Started.running(command)))
             for shown in typed.shown:
-                started[-1].said(*shown.split("…"))
+                started[-1].next_line(*shown.split("…"))
         by_machine = {typed.machine: process for typed, process in zip(commands, started, strict=True)}
         assert [process.ended() for process in started if process is not by_machine["gate"]] == [0, 0, 0]
         assert by_machine["laptop"].lines[-1] == "the run is over"

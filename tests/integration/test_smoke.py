@@ -74,7 +74,7 @@ def test_driver_and_gateway_of_a_robot_communicate():
     rig = RIGS["epuck2"]()
     try:
         rig.connect()
-        rig.told()
+        rig.pop_commands()
         rig.driver.act(Command(0.05, 0.5))
         rig.until_told(0.05, 0.5)
     finally:

@@ -55,7 +55,7 @@ def until(look: Callable[[], T], holds: Callable[[T], object] = bool) -> T:
     """What `look` returns as soon as it `holds`; AssertionError if it does not in a minute."""
     clock, pause = WallClock(), Event()
     end_ns = clock.now_ns() + to_ns(TIMEOUT_S)
-    while not holds(found := look()):
-        assert clock.now_ns() < end_ns, f"it did not come to hold; last seen: {found!r}"
+    while not holds(value := look()):
+        assert clock.now_ns() < end_ns, f"it did not come to hold; last seen: {value!r}"
         pause.wait(EACH_S)
-    return found
+    return value

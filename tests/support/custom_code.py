@@ -239,6 +239,6 @@ def install(
     info = site / f"{name}-1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
-    lines = [f"{point} = {name}:{of}" for point, of in points.items()]
+    lines = [f"{point} = {name}:{target}" for point, target in points.items()]
     (info / "entry_points.txt").write_text("\n".join([f"[{group}]", *lines, ""]))
     (site / f"{name}.py").write_text(code)

@@ -28,7 +28,7 @@ class Miniature:
 
     runs: Mapping[str, pl.DataFrame]  # digests by campaign
     figure: Any
-    told: str
+    numbers: str
 
 
 def miniature(
@@ -46,8 +46,8 @@ def miniature(
     fail.
     """
     experiment = find_experiment(name, LAYOUT)
-    asked = experiment.campaigns if campaigns is None else campaigns
-    runs = {campaign: _digest(experiment, campaign, folder, seeds, vary or {}, overrides) for campaign in asked}
+    selected = experiment.campaigns if campaigns is None else campaigns
+    runs = {campaign: _digest(experiment, campaign, folder, seeds, vary or {}, overrides) for campaign in selected}
     if campaigns is not None:
         return Miniature(runs, None, "")
     return Miniature(runs, experiment.draw(runs), experiment.numbers(runs))
@@ -62,10 +62,12 @@ def _digest(
     overrides: Sequence[str],
 ) -> pl.DataFrame:
     file = LAYOUT.campaigns / f"{campaign}.toml"
-    found = campaign_file(file)
-    assert found is not None, file
-    spec = replace(spec_in(file, found), seeds=seed_list(seeds))
-    varied = tuple(vary_from(of.path, vary[of.path], of.path) if of.path in vary else of for of in spec.varied)
+    table = campaign_file(file)
+    assert table is not None, file
+    spec = replace(spec_in(file, table), seeds=seed_list(seeds))
+    varied = tuple(
+        vary_from(axis.path, vary[axis.path], axis.path) if axis.path in vary else axis for axis in spec.varied
+    )
     plan = plan_of(replace(spec, varied=varied, overrides=(*spec.overrides, *overrides)))
     done = begin_sweep(plan, folder / campaign, "a miniature", ExecutionOptions(executor=InThisProcess(1)))
     assert done.is_over

@@ -116,10 +116,10 @@ class RawRunner:
         for payload in (*self._early, frame("ready", -1, {}, {})):
             answers.put(payload)
         while (sample := self._arrived.get()) is not None:
-            told = msgpack.unpackb(sample.payload.to_bytes())
-            if told["kind"] == "end":
+            message = msgpack.unpackb(sample.payload.to_bytes())
+            if message["kind"] == "end":
                 break
-            turn = Turn(self, told["tick"], acted(told["arrays"], assignment))
+            turn = Turn(self, message["tick"], acted(message["arrays"], assignment))
             for payload in self._says(turn):
                 answers.put(payload)
             self.frames.append(turn.honest)
@@ -130,7 +130,7 @@ class RawRunner:
 class Prank:
     """Something that a runner does in one tick."""
 
-    what: str  # in the words of the docs
+    title: str  # in the words of the docs
     says: Callable[[Turn], Sequence[bytes]]
     counts: Mapping[str, int] = field(default_factory=dict[str, int])
     fates: tuple[str, ...] = ()  # of its packets
@@ -138,7 +138,7 @@ class Prank:
 
 def first(*wrong: Callable[[Turn], bytes]) -> Callable[[Turn], Sequence[bytes]]:
     """Something wrong, then the honest answer."""
-    return lambda turn: [*(of(turn) for of in wrong), turn.honest]
+    return lambda turn: [*(answer(turn) for answer in wrong), turn.honest]
 
 
 def only(wrong: Callable[[Turn], bytes]) -> Callable[[Turn], Sequence[bytes]]:
@@ -185,7 +185,7 @@ def elsewhere(turn: Turn) -> Sequence[bytes]:
 
 def joins(*requests: tuple[str, Any]) -> Callable[[Turn], Sequence[bytes]]:
     def says(turn: Turn) -> Sequence[bytes]:
-        return [*(_asked(turn, name or turn.runner.name, what) for name, what in requests), turn.honest][-1:]
+        return [*(_asked(turn, name or turn.runner.name, request) for name, request in requests), turn.honest][-1:]
 
     return says
 
@@ -213,7 +213,7 @@ def stolen(turn: Turn) -> bytes:
     return turn.other(sent=packed("<i8", [2, len(to)], [*senders[:-1], 0, *to]))
 
 
-def told(turn: Turn, value: float) -> bytes:
+def published(turn: Turn, value: float) -> bytes:
     """The answer with a number of its first robot for whoever looks on."""
     return frame("actions", turn.tick, turn.arrays | _table("values", turn, 0, value), {})
 
@@ -228,9 +228,9 @@ def lit(turn: Turn, which: int, rgb: int) -> bytes:
     return frame("actions", turn.tick, turn.arrays | _table("leds", turn, which, float(rgb)), {})
 
 
-def _table(name: str, turn: Turn, place: int, value: float) -> dict[str, Any]:
+def _table(name: str, turn: Turn, slot: int, value: float) -> dict[str, Any]:
     """A number of the first robot as the arrays of a sparse table."""
-    return {name: packed("<i8", [2, 1], [rows_of(turn)[0], place]), f"{name}/value": packed("<f8", [1], [value])}
+    return {name: packed("<i8", [2, 1], [rows_of(turn)[0], slot]), f"{name}/value": packed("<f8", [1], [value])}
 
 
 BESIDE = (
@@ -275,7 +275,7 @@ BESIDE = (
     ),
     Prank(
         "notes that are not finite numbers",
-        first(lambda turn: told(turn, NAN), lambda turn: told(turn, INF)),
+        first(lambda turn: published(turn, NAN), lambda turn: published(turn, INF)),
         {"malformed_frames": 2},
     ),
     Prank(

@@ -68,18 +68,18 @@ def peers(count: int) -> Generator[list[zenoh.Session]]:
             close_session(session)
 
 
-def radio(session: zenoh.Session, own: str, clock=None, robots: Sequence[str] = ROBOTS, **given) -> ZenohRadio:
+def radio(session: zenoh.Session, own: str, clock=None, robots: Sequence[str] = ROBOTS, **options) -> ZenohRadio:
     """An open radio of a robot."""
-    made = ZenohRadio(session, KEYS, robots, own, MAX_BYTES, clock or WallClock(), **given)
+    made = ZenohRadio(session, KEYS, robots, own, MAX_BYTES, clock or WallClock(), **options)
     made.open()
     return made
 
 
 @contextmanager
-def radios(count: int = 2, **given) -> Generator[list[ZenohRadio]]:
+def radios(count: int = 2, **options) -> Generator[list[ZenohRadio]]:
     """Radios of the first robots of the swarm, each of which hears all others."""
     with peers(count) as sessions:
-        made = [radio(session, own, **given) for session, own in zip(sessions, ROBOTS, strict=False)]
+        made = [radio(session, own, **options) for session, own in zip(sessions, ROBOTS, strict=False)]
         for session, its in zip(sessions, made, strict=True):
             meet(session, [other for other in made if other is not its])
         yield made
@@ -111,15 +111,15 @@ def words(*numbers: float, to: int = BROADCAST, row: int = 0) -> SentPackets:
     return SentPackets(np.full(len(numbers), row), np.full(len(numbers), to), payloads)
 
 
-def received_by(of, packets: int, now_ns: int = 0) -> list[tuple[int, int, float]]:
+def received_by(radio, packets: int, now_ns: int = 0) -> list[tuple[int, int, float]]:
     """Sender, sequence and number of so many words that a radio hears."""
-    found: list[tuple[int, int, float]] = []
+    rows: list[tuple[int, int, float]] = []
 
     def all_there() -> bool:
-        received, _ = of.received(now_ns)
+        received, _ = radio.received(now_ns)
         its = zip(received.sender_index.tolist(), received.sequence.tolist(), received.payload.tolist(), strict=True)
-        found.extend((sender, number, Word.decode(received.payloads.row(at)).number) for sender, number, at in its)
-        return len(found) >= packets
+        rows.extend((sender, number, Word.decode(received.payloads.row(at)).number) for sender, number, at in its)
+        return len(rows) >= packets
 
     until(all_there)
-    return found
+    return rows

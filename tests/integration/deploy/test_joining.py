@@ -153,7 +153,7 @@ def do(joiners: Joiners, line: str) -> None:
     action, *words = line.split() or [""]
     if action == "start":
         if words[0] in joiners.processes:  # which was killed
-            joiners.said(words[0])
+            joiners.outcome(words[0])
         joiners.start(words[0], *words[1:])
     elif action == "quit":
         interrupt()
@@ -181,7 +181,7 @@ def test_runners_that_join_leave_or_are_lost_change_a_run_as_stated(joiners, tmp
     )
     assert not watcher.steps
     first = [f"joined {line.split()[0]}" for line in case.first]
-    assert [" ".join(change) for change in joiners.told] == [
+    assert [" ".join(change) for change in joiners.events] == [
         *first,
         *(case.changes.split(", ") if case.changes else []),
     ]
@@ -193,7 +193,7 @@ def test_runners_that_join_leave_or_are_lost_change_a_run_as_stated(joiners, tmp
     assert counts == (case.counts or counts)
     assert (len(result.lost_runners) == 0) == ("lost" not in case.changes)
     for name, (code, last) in case.ends.items():
-        exit_code, output = joiners.said(name)
+        exit_code, output = joiners.outcome(name)
         assert (exit_code, output.splitlines()[-1]) == (code, last)
         assert output.splitlines()[0].startswith(f"{name}: joined run ")
     stops = result.realtime.watchdog_stops.keys() if result.realtime else set[str]()
@@ -236,7 +236,7 @@ def test_runner_that_may_not_join_is_told_why_at_both_ends(joiners, tmp_path):
     joiners.on_change, joiners.refused = others, after
     result = joiners.run(SHORT)
     for name, (_, why) in refused.items():
-        code, output = joiners.said(f"refused {name}")
+        code, output = joiners.outcome(f"refused {name}")
         assert code == 1
         assert output.splitlines()[-1].startswith(f"runner {name} got no robots: {why}")
         assert any(runner == name and text.startswith(why) for runner, text in joiners.refusals)

@@ -38,7 +38,7 @@ def test_panel_shows_a_pause_and_a_speed_of_ctl_and_ends_with_the_run(tmp_path):
         ctl(tmp_path / "run", "resume")
         user.wait(lambda picture: "at most" in picture and tick(picture) > paused_tick)
         ctl(tmp_path / "run", "stop")
-        text = user.rest()
+        text = user.transcript()
         assert user.process.returncode == 130
         assert not user.changed()
         assert user.output.rfind(b"\x1b[?25h") > user.output.rfind(b"\x1b[?25l")  # the cursor is there again
@@ -61,7 +61,7 @@ def test_ctrl_c_ends_a_run_in_real_time_over_runners_and_gives_the_terminal_back
         ctl(tmp_path / "run", "speed", "20")
         user.wait(lambda picture: "real time x 20" in picture)
         user.type("\x03")
-        user.rest()
+        user.transcript()
         assert user.process.returncode == 130
         assert not user.changed()
     realtime = json.loads((tmp_path / "run" / "summary.json").read_text())["realtime"]
@@ -79,7 +79,7 @@ def test_without_a_terminal_there_are_plain_lines(tmp_path):
 
 def test_quiet_option_shows_no_panel(tmp_path):
     with terminal("run", LOSSY, "--set", "duration_s=1", "--quiet", "--out", tmp_path / "run") as user:
-        assert user.rest() == ""
+        assert user.transcript() == ""
         assert user.process.returncode == 0
 
 
@@ -218,6 +218,6 @@ def test_world_at_a_terminal_shows_who_is_missing_until_ctrl_c(tmp_path):
         while "0 of 20 robots have agents" not in window.text:
             assert window._read(), window.text
         os.kill(window.process.pid, signal.SIGINT)
-        text = window.rest()
+        text = window.transcript()
     assert window.process.returncode == 130
     assert "interrupted" in text

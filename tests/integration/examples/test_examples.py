@@ -162,7 +162,7 @@ def with_own(folder: Path, flock: Scenario | Path, **more: Any) -> tuple[Result,
     joiners.first = [("foreign", "--robots", str(OWN)), ("own",)]
     with closing(joiners):
         result = run(flock, listening=Listening(HERE, observer=joiners), **more)
-        return result, joiners.said("foreign")[0]
+        return result, joiners.outcome("foreign")[0]
 
 
 def test_foreign_program_plays_as_an_agent_of_the_same_rule_does(tmp_path: Path) -> None:

@@ -20,5 +20,5 @@ def rig(request: pytest.FixtureRequest) -> Iterator[Rig]:
 def connected(rig: Rig) -> Rig:
     """A rig of each kind whose driver is open, with nothing that was told before."""
     rig.connect()
-    rig.told()
+    rig.pop_commands()
     return rig

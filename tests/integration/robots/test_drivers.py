@@ -107,7 +107,7 @@ def test_led_command_changes_that_led_alone(connected: Rig) -> None:
             connected.driver.sense(frozenset())
 
             def shows(which: int = which, colour: int = colour) -> bool:
-                shown.update(connected.told().leds)
+                shown.update(connected.pop_commands().leds)
                 return shown[which] == colour
 
             until(shows)
@@ -117,7 +117,7 @@ def test_led_command_changes_that_led_alone(connected: Rig) -> None:
 def test_driver_stops_its_robot_when_opened(rig: Rig) -> None:
     rig.connect()
     if rig.stands_until_commanded:
-        assert all(rig.same_speeds(speeds, (0.0, 0.0)) for speeds in rig.told().speeds)
+        assert all(rig.same_speeds(speeds, (0.0, 0.0)) for speeds in rig.pop_commands().speeds)
     else:
         rig.until_told(0.0, 0.0)
 
@@ -166,10 +166,10 @@ def test_dead_robot_is_lost_in_time_and_reconnected_when_it_lives(connected: Rig
 
 def test_dead_robot_applies_no_command(connected: Rig) -> None:
     connected.publish(readings(0.0), alive=False)
-    connected.told()
+    connected.pop_commands()
     connected.driver.act(Command(0.05, 0.0))
     sense_until_lost(connected)
-    assert all(linear_mps == 0.0 for linear_mps, _ in connected.told().speeds)
+    assert all(linear_mps == 0.0 for linear_mps, _ in connected.pop_commands().speeds)
 
 
 def test_revived_robot_is_at_rest(connected: Rig) -> None:
@@ -223,7 +223,7 @@ def test_motors_can_be_stopped_by_another_thread_during_a_read(connected: Rig) -
     connected.until_told(0.0, 0.0)
     done.set()
     reader.join()
-    assert all(connected.same_speeds(speeds, (0.0, 0.0)) for speeds in connected.told().speeds)
+    assert all(connected.same_speeds(speeds, (0.0, 0.0)) for speeds in connected.pop_commands().speeds)
 
 
 def test_stopped_robot_drives_with_the_next_command(connected: Rig) -> None:
@@ -251,7 +251,7 @@ def test_stop_of_an_unconnected_robot_does_nothing(rig: Rig) -> None:
     driver.stop()
     driver.close()
     driver.stop()
-    assert rig.told().speeds == []
+    assert rig.pop_commands().speeds == []
 
 
 @pytest.fixture
@@ -259,7 +259,7 @@ def link(rig: OwnWireRig) -> Iterator[FaultyLink]:
     """A link that passes everything on, with the rig's driver open at its end."""
     with FaultyLink(rig.address_of_link()) as link:
         rig.connect(link.address)
-        rig.told()
+        rig.pop_commands()
         yield link
         rig.driver.close()
 
@@ -331,5 +331,5 @@ def test_robot_continues_its_last_command_after_a_lost_link(rig: OwnWireRig, lin
     rig.until_told(0.05, 0.0)
     link.answers = CutAfter(0, hang_up=True)
     sense_until_lost(rig)
-    speeds = rig.told().speeds
+    speeds = rig.pop_commands().speeds
     assert all(np.isclose(linear_mps, 0.05, atol=1e-3) for linear_mps, _ in speeds)

@@ -62,7 +62,7 @@ def test_pranks_beside_honest_answers_are_counted_and_change_nothing(honest: tup
     assert result.trajectory_sha256 == honest[0].trajectory_sha256
     for number, prank in enumerate(BESIDE):
         tick = FIRST + EVERY * number
-        assert played.counted[tick + 1] - played.counted[tick - 1] == Counter(prank.counts), prank.what
+        assert played.counted[tick + 1] - played.counted[tick - 1] == Counter(prank.counts), prank.title
     assert (result.ended, result.ticks) == ("duration", TICKS)
     assert any(refusal.startswith("the name odd is in use") for refusal in played.refusals)
 

@@ -20,7 +20,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.deploy.runs.scenario_parts import selected_metrics
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.experiments import mean_direction, mean_order, miniature
-from tests.support.metrics.swarms import said, stand
+from tests.support.metrics.swarms import measure, stand
 
 SCENARIOS: Path = LAYOUT.campaigns / "scenarios"
 COUNT, SPACING = "robots.flock.count", "robots.flock.place.spacing_m"
@@ -86,7 +86,7 @@ def test_consensus_decays_by_the_formula_and_losses_bias_it(tmp_path) -> None:
                 graph.after(steps, loss).bias, rel=0.3, abs=1e-6
             )
     assert len(small.figure.axes) == 2
-    assert "| ring of 10 | 0.5 |" in small.told
+    assert "| ring of 10 | 0.5 |" in small.numbers
 
 
 def drawn(graph, loss: float, steps: int, seed: int) -> FloatArray:
@@ -167,7 +167,7 @@ def module():
 def test_fragmentation_is_drawn_and_wide_gaps_split(tmp_path):
     small = miniature("fragmentation", tmp_path, seeds=2, vary=FEW, overrides=["duration_s=28"])
     assert len(small.figure.axes) == 2 * len(small.runs)
-    assert small.told.count("Split by") == len(small.runs)
+    assert small.numbers.count("Split by") == len(small.runs)
     split = {name: len(module().fell_apart(runs)) for name, runs in small.runs.items()}
     assert split["fragmentation-partition"] == 2, "in every run six do not hear the other six"
     at_rocks = small.runs["fragmentation-obstacle"]
@@ -209,7 +209,7 @@ def test_learning_is_drawn_with_policies_and_rules_of_both_tasks(tmp_path: Path)
     assert len(small.figure.axes) == 2
     for axes in small.figure.axes:
         assert [len(line.get_xdata()) for line in axes.lines] == [2, 2, 2]
-    assert small.told.count("| 0.9 | ") == 2
+    assert small.numbers.count("| 0.9 | ") == 2
 
 
 def test_lennard_jones_is_drawn_and_oscillates_more_under_loss(tmp_path):
@@ -217,7 +217,7 @@ def test_lennard_jones_is_drawn_and_oscillates_more_under_loss(tmp_path):
     small = miniature("lennard-jones", tmp_path, seeds=3, vary=vary, overrides=["duration_s=20"])
     (runs,) = small.runs.values()
     assert len(small.figure.axes) == 4
-    assert small.told.count("\n") == 1 + 4
+    assert small.numbers.count("\n") == 1 + 4
     mean = {key: g["oscillation.final"].to_numpy().mean() for key, g in runs.group_by("radio.loss", "radio.latency_s")}
     assert mean[0.9, 0.0] > 1.5 * mean[0.0, 0.0]
 
@@ -225,8 +225,8 @@ def test_lennard_jones_is_drawn_and_oscillates_more_under_loss(tmp_path):
 def test_minimalist_flocking_is_drawn_with_all_rows(tmp_path):
     small = miniature(NAME, tmp_path, seeds=2, overrides=["duration_s=1"])
     assert len(small.figure.axes) == 4
-    assert small.told.count("**") == 2 * 6
-    assert all(f"| equal density | {n} | 2 |" in small.told for n in (5, 10, 15, 20))
+    assert small.numbers.count("**") == 2 * 6
+    assert all(f"| equal density | {n} | 2 |" in small.numbers for n in (5, 10, 15, 20))
 
 
 def test_minimalist_flocking_depends_on_thresholds_and_hop_comes_last(tmp_path):
@@ -261,7 +261,7 @@ def test_movement_with_proximity_covers_more_and_touches_less(tmp_path: Path) ->
     assert (looks["coverage.final"].to_numpy() > blind["coverage.final"].to_numpy()).all()
     assert {(side, radius) for side, radius, _, _ in points(runs)} == {(s, r) for s in (3.0, 4.0) for r in (0.05, 0.2)}
     assert len(done.figure.axes) == 3
-    assert done.told.count("\n| ") == 2 + 8
+    assert done.numbers.count("\n| ") == 2 + 8
 
 
 @pytest.mark.slow
@@ -270,7 +270,7 @@ def test_pso_is_drawn_with_all_campaigns(tmp_path, name, panels, tables):
     short = [*SMALL, "duration_s=20"]
     small = miniature(name, tmp_path, seeds=1, vary={**FEW_POINTS, "radio.range_m": [2.0, 12.0]}, overrides=short)
     assert len(small.figure.axes) == panels
-    assert small.told.count("\n\n| ") == tables
+    assert small.numbers.count("\n\n| ") == tables
 
 
 @pytest.mark.parametrize("campaign", ["pso-range", "pso-range-model"])
@@ -333,7 +333,7 @@ def test_threshold_rule_deadlocks_in_the_corridor_unless_replaced(tmp_path: Path
         assert sample_of(runs, deadlocked, SMOOTHED).value.mean() < 0.05
         assert sample_of(runs, swings, SMOOTHED).value.max() == 0.0, "the cure never drives backwards"
     assert len(done.figure.axes) == 3
-    assert done.told.count("the article's rule") == 1 + 4
+    assert done.numbers.count("the article's rule") == 1 + 4
 
 
 def test_vicsek_order_falls_with_noise_and_is_exact_for_all_to_all(tmp_path) -> None:
@@ -345,7 +345,7 @@ def test_vicsek_order_falls_with_noise_and_is_exact_for_all_to_all(tmp_path) -> 
     expected = all_to_all(alike[NOISE].to_numpy(), 40)
     assert alike["order.late"].to_numpy() == pytest.approx(expected, abs=0.03)
     assert len(small.figure.axes) == 2
-    assert "| all hear all | 4 |" in small.told
+    assert "| all hear all | 4 |" in small.numbers
 
 
 def test_vicsek_correction_for_few_robots_matches_drawn_headings() -> None:
@@ -442,4 +442,4 @@ def test_loss_map_is_drawn_with_all_cells(corners):
 def test_loss_map_flock_is_aligned_and_together(poses, flock):
     scenario = load_scenario(LAYOUT.campaigns / "scenarios" / "loss-map-flocking.toml")
     (metric,) = selected_metrics(scenario).metrics
-    assert said(metric, stand(*poses)) == [pytest.approx(flock, abs=1e-9)]
+    assert measure(metric, stand(*poses)) == [pytest.approx(flock, abs=1e-9)]

@@ -114,8 +114,8 @@ class Cluster:
              "--no-dashboard", "--dashboard-address", ":0"],
             stderr=subprocess.PIPE, text=True, cwd=folder, env=self._settings,
         )  # fmt: skip
-        told = next(line for line in self.scheduler.stderr if "Scheduler at:" in line)
-        self.address = told.rpartition("tcp://")[2].strip()
+        printed = next(line for line in self.scheduler.stderr if "Scheduler at:" in line)
+        self.address = printed.rpartition("tcp://")[2].strip()
         self.name = f"dask://{self.address}"
 
     def add_worker(self, *, preload: Path | None = None) -> psutil.Popen:
@@ -151,13 +151,13 @@ def children(nanny: psutil.Popen) -> list[psutil.Process]:
 @contextmanager
 def cluster(folder: Path, workers: int, **settings: str) -> Generator[Cluster]:
     """A cluster with so many workers."""
-    found = Cluster(folder, **settings)
+    cluster = Cluster(folder, **settings)
     try:
         for _ in range(workers):
-            found.add_worker()
-        yield found
+            cluster.add_worker()
+        yield cluster
     finally:
-        found.end()
+        cluster.end()
 
 
 @pytest.fixture

@@ -89,8 +89,8 @@ class DrivenRobots:
         for agent in self._agents:
             agent.result()
 
-    def _drive(self, file: Path, given: dict[str, Any]) -> None:
-        settings = read_settings(file, {key: ("test", value) for key, value in given.items()})
+    def _drive(self, file: Path, values: dict[str, Any]) -> None:
+        settings = read_settings(file, {key: ("test", value) for key, value in values.items()})
         clock = ScaledClock(WallClock(), settings.pace)
         plan = robot_config(settings, str(file), clock)
         driver = plan.driver
@@ -167,11 +167,11 @@ class Speeds(Observer):
         self.moved = np.zeros((2, static.arenas))
 
     def see(self, truth: Truth) -> None:
-        of = truth.velocity.reshape(self.static.arenas, -1, 3)
-        self.moved += np.stack([np.hypot(of[..., 0], of[..., 1]).mean(1), np.abs(of[..., 2]).mean(1)])
+        velocity = truth.velocity.reshape(self.static.arenas, -1, 3)
+        self.moved += np.stack([np.hypot(velocity[..., 0], velocity[..., 1]).mean(1), np.abs(velocity[..., 2]).mean(1)])
         self.ticks += 1
 
-    def of(self, arena: int) -> dict[str, float]:
+    def means(self, arena: int) -> dict[str, float]:
         """Mean speed in m/s and mean turn rate in rad/s of the robots of an arena."""
         speed, turn = self.moved[:, arena] / self.ticks
         return {"speed": float(speed), "turn": float(turn)}
@@ -179,15 +179,15 @@ class Speeds(Observer):
 
 def measured(arena: ArenaResult, speeds: dict[str, float]) -> dict[str, float]:
     """All numbers that the run has."""
-    found = dict(speeds)
+    numbers = dict(speeds)
     for name, which in METRICS.items():
         value = getattr(arena.metrics[name.removeprefix("mean ")], which)
         if value is not None:
-            found[name] = value
-    return found
+            numbers[name] = value
+    return numbers
 
 
-def outside(found: dict[str, float], spread: dict[str, FloatArray], names: tuple[str, ...]) -> list[str]:
+def outside(numbers: dict[str, float], spread: dict[str, FloatArray], names: tuple[str, ...]) -> list[str]:
     """Which of these numbers lie outside the range of `spread`, told.
 
     The range is widened on either side by its width, or by a tenth of its highest value, if that is more.
@@ -195,10 +195,12 @@ def outside(found: dict[str, float], spread: dict[str, FloatArray], names: tuple
     If a number is drawn as those of the spread are, one of twenty seeds, it lies outside of their range with a
     probability of 2 in 21, and outside of the widened one with one of 2e-3 if it is normal. Counts may be two more.
     """
-    told: list[str] = []
+    lines: list[str] = []
     for name in names:
         low, high = float(spread[name].min()), float(spread[name].max())
         more = high - low + 2.0 if name in COUNTS else max(high - low, 0.1 * high)
-        if not low - more <= found[name] <= high + more:
-            told.append(f"{name} is {found[name]:.4g}, expected {low:.4g} to {high:.4g}, and {more:.4g} beyond at most")
-    return told
+        if not low - more <= numbers[name] <= high + more:
+            lines.append(
+                f"{name} is {numbers[name]:.4g}, expected {low:.4g} to {high:.4g}, and {more:.4g} beyond at most"
+            )
+    return lines

@@ -83,8 +83,8 @@ class Joiners(JoinObserver):
     def send(self, name: str, number: signal.Signals) -> None:
         self.processes[name].send_signal(number)
 
-    def said(self, name: str) -> tuple[int, str]:
-        """The exit code of a runner that ends, and what it said."""
+    def outcome(self, name: str) -> tuple[int, str]:
+        """The exit code of a runner that ends, and what it printed."""
         process = self.processes.pop(name)
         _, errors = process.communicate(timeout=60.0)
         return process.returncode, errors
@@ -112,13 +112,13 @@ class Joiners(JoinObserver):
             self.start(str(name), *arguments)
 
     @property
-    def told(self) -> list[tuple[str, str]]:
+    def events(self) -> list[tuple[str, str]]:
         """What became of whom, in order."""
         return [(change.what, change.runner) for change in self.changes]
 
-    def tick_of(self, what: str) -> int | None:
+    def tick_of(self, event: str) -> int | None:
         """The tick in which this was told; None: not yet."""
-        return next((change.tick for change in self.changes if f"{change.what} {change.runner}" == what), None)
+        return next((change.tick for change in self.changes if f"{change.what} {change.runner}" == event), None)
 
     def run(
         self, *overrides: str, watcher: Watcher | None = None, start_with: int | None = None, **more: Any
@@ -143,8 +143,8 @@ class EncodedJoiners:
     """
 
     def __init__(self, assignment: Assignment, on_loss: OnLoss, script: Mapping[int, Sequence[str]]) -> None:
-        kept = {group.name: layout_of(load_agent(group.agent)) for group in assignment.groups}
-        terms = JoinPolicy(open=True, start_with=0, memory=kept if on_loss in REPLACEABLE else None)
+        memory = {group.name: layout_of(load_agent(group.agent)) for group in assignment.groups}
+        terms = JoinPolicy(open=True, start_with=0, memory=memory if on_loss in REPLACEABLE else None)
         self.roster = Lockstep([assignment], on_loss, terms)
         self._script = script
         self._runners: dict[str, EncodedRunner] = {}
@@ -165,16 +165,16 @@ class EncodedJoiners:
         assert not self.roster.waiting, self.roster.missing
         return self.roster.pop_actions()
 
-    def _do(self, what: str, name: str, robots: str = "") -> None:
-        if what == "join":
-            asked = {"robots": int(robots)} if robots.isdigit() else {"names": tuple(robots.split(","))}
-            request = JoinRequest(**(asked if robots else {}))
+    def _do(self, action: str, name: str, robots: str = "") -> None:
+        if action == "join":
+            fields = {"robots": int(robots)} if robots.isdigit() else {"names": tuple(robots.split(","))}
+            request = JoinRequest(**(fields if robots else {}))
             runner = self._runners[name] = EncodedRunner(partial(self.roster.join, name), request)
             self._deliver(self.roster.answer(name, runner.ready))
-        elif what == "leave":
+        elif action == "leave":
             self.roster.answer(name, frames.encode("leave", -1, {}))
             del self._runners[name]
-        elif what == "lose":
+        elif action == "lose":
             self.roster.lose(name, "its link is gone")
             self._runners.pop(name, None)
 
@@ -192,9 +192,9 @@ class EncodedJoiners:
 
 def moves(truths: Sequence[Truth]) -> dict[int, list[int]]:
     """From which tick on which robots were told to move."""
-    found = defaultdict[int, list[int]](list)
+    rows = defaultdict[int, list[int]](list)
     last: list[int] | None = None
     for truth in truths:
         if (now := moving(truth)) != last:
-            found[truth.tick] = last = now
-    return dict(found)
+            rows[truth.tick] = last = now
+    return dict(rows)

@@ -97,8 +97,8 @@ class GuardedWorld(Observer, JoinObserver):
 
     def opened(self, endpoints: tuple[str, ...], run_id: str) -> None:
         self.endpoint, self.keys, self.seen = endpoints[0], Keys(run_id), ObserverKeys(run_id)
-        for place, name in enumerate(HONEST):
-            robots = tuple(f"flock-{i}" for i in range(10 * place, 10 * place + 10))
+        for index, name in enumerate(HONEST):
+            robots = tuple(f"flock-{i}" for i in range(10 * index, 10 * index + 10))
             self._threads.append(threading.Thread(target=self._play, args=(name, robots)))
             self._threads[-1].start()
 
@@ -155,8 +155,8 @@ def machines(several: int) -> Generator[list[Machine]]:
                 *("ip", "link", "add", one, "netns", left.name),
                 *("type", "veth", "peer", "name", other, "netns", right.name),
             )
-            for place, (machine, device) in enumerate(ends, 1):
-                machine.addresses.append(f"10.77.{i}.{place}")
+            for index, (machine, device) in enumerate(ends, 1):
+                machine.addresses.append(f"10.77.{i}.{index}")
                 machine.devices.append(device)
                 _permitted("ip", "-n", machine.name, "address", "add", f"{machine.addresses[-1]}/24", "dev", device)
                 _permitted("ip", "-n", machine.name, "link", "set", device, "up")
@@ -213,7 +213,7 @@ class Started:
             assert started.process.stdout is not None
             started.process.stdout.close()
 
-    def said(self, *texts: str) -> str:
+    def next_line(self, *texts: str) -> str:
         """The next line that holds all these texts, waited for."""
         while (line := self._next()) is not None:
             if all(text in line for text in texts):

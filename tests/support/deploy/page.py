@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 import sys
-import threading
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
@@ -30,12 +29,12 @@ def paged(scenario: Path, out: Path, *options: str) -> Generator[tuple["subproce
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         assert process.stdout is not None
         try:
-            said = ""
-            while (found := re.search(r"open (http://127\.0\.0\.1:\d+/\S+/) in a browser", said)) is None:
+            text = ""
+            while (match := re.search(r"open (http://127\.0\.0\.1:\d+/\S+/) in a browser", text)) is None:
                 line = process.stdout.readline()
-                assert line, said
-                said += line
-            yield process, found[1]
+                assert line, text
+                text += line
+            yield process, match[1]
         finally:
             for one in reversed(family(process.pid)):
                 with contextlib.suppress(psutil.NoSuchProcess):
@@ -102,12 +101,10 @@ class StandIn:
     def __init__(self) -> None:
         self.asked: list[tuple[str, Any]] = []
         self.tick, self.state, self.gone = 0, "running", False
-        self.told = threading.Event()  # a status was asked for
 
     def status(self) -> dict[str, Any]:
         if self.gone:
             raise RunGone("nobody answers")
-        self.told.set()
         metrics = {"order": 0.5, "rejoin_median": None}
         return {"tick": self.tick, "ticks": 100, "time_s": self.tick / 10, "state": self.state, "metrics": metrics,
                 "measures_ms": 1.5, "alive": 3}  # fmt: skip

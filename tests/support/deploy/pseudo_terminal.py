@@ -31,15 +31,15 @@ class Terminal:
 
     def wait(self, until: Callable[[str], bool]) -> str:
         """The newest panel, once it is as it should be; only those that come from now on count."""
-        seen = len(self.pictures())
+        count = len(self.pictures())
         while True:
-            for picture in self.pictures()[seen:]:
-                seen += 1
+            for picture in self.pictures()[count:]:
+                count += 1
                 if until(picture):
                     return picture
             assert self._read(), f"it ended or stood still: {self.text[-3000:]}"
 
-    def rest(self) -> str:
+    def transcript(self) -> str:
         """All that it showed, once it has ended."""
         while self._read():
             pass

@@ -198,9 +198,9 @@ def at_tick(control: RemoteControl, tick: int) -> dict[str, Any]:
     return until(control.status, lambda status: (status["state"], status["tick"]) == ("paused", tick))
 
 
-def run_spread(scenario: Path, runners: int | None, **given: Any) -> Result:
+def run_spread(scenario: Path, runners: int | None, **options: Any) -> Result:
     """A run with its robots in so many parts; None: agents get what they sense as it is."""
     with pytest.MonkeyPatch.context() as patched:
         if runners is not None:
             patched.setattr(backends, "LocalBackend", partial(EncodedBackend, runners=runners))
-        return run(scenario, **given)
+        return run(scenario, **options)

@@ -78,13 +78,13 @@ def scenario_in(folder: Path) -> Path:
     return path
 
 
-def plan_of(scenario: Path, *searched: str, **said: Any) -> TuningPlan:
+def plan_of(scenario: Path, *searched: str, **options: Any) -> TuningPlan:
     """The plan of a tuning for the bowl, unless something else is said."""
-    seeds = seed_list(said.pop("seeds", 2))
+    seeds = seed_list(options.pop("seeds", 2))
     usual = {"goal": "min bowl", "trials": 10, "parallel_trials": 4, "sampler_seed": 1}
     searches = tuple(map(search_of, searched or (AT,)))
-    fresh = fresh_seeds(said.pop("check_seeds", "2"), seeds)
-    return tuning_plan(TuningSpec(scenario, searches, seeds=seeds, check_seeds=fresh, **{**usual, **said}))
+    fresh = fresh_seeds(options.pop("check_seeds", "2"), seeds)
+    return tuning_plan(TuningSpec(scenario, searches, seeds=seeds, check_seeds=fresh, **{**usual, **options}))
 
 
 class Calculating(InThisProcess):
@@ -124,9 +124,9 @@ class Looking:
         return TuneObservers(self, NoObserver(), self.interrupt)
 
 
-def tuned(scenario: Path, folder: Path, *searched: str, until: int | None = None, **said: Any) -> Any:
+def tuned(scenario: Path, folder: Path, *searched: str, until: int | None = None, **options: Any) -> Any:
     """What came of a tuning (`Tuned`), ended after so many trials if that is said."""
-    plan = plan_of(scenario, *searched, **said)
+    plan = plan_of(scenario, *searched, **options)
     return begin_tune(plan, folder, "tune", None, Looking(until).observers())
 
 

@@ -143,17 +143,17 @@ def _row(
     draws: int,
 ) -> dict[str, Any]:
     rng = np.random.default_rng([draws, run])
-    found: dict[str, Any] = {column: make(point, rng) for column, make in numbers.items()}
+    outcome: dict[str, Any] = {column: make(point, rng) for column, make in numbers.items()}
     for column, make in times.items():
         time_s = make(point, rng)
-        found[column] = time_s if time_s is not None and time_s <= limit_s else None
+        outcome[column] = time_s if time_s is not None and time_s <= limit_s else None
     ticks = int(limit_s * RATE_HZ)
     row: dict[str, Any] = {"run": run, "seed": seed, **point, "timing_wall_s": 0.5, "machine_cpu": "made-up CPU"}
     row |= {"machine_host": "here", "machine_worker": 0}
     if failed:
         return row | {"ended": "failed", "error": "the agent of flock-0 failed"}
     return (
-        row | found | {"ended": "duration", "ticks": ticks, "sim_time_s": limit_s, "trajectory_sha256": f"{run:064x}"}
+        row | outcome | {"ended": "duration", "ticks": ticks, "sim_time_s": limit_s, "trajectory_sha256": f"{run:064x}"}
     )
 
 

@@ -37,7 +37,7 @@ def two_groups(arenas: int = 1) -> Static:
     )
 
 
-def film(ticks: int = 31, **given: Any) -> Film:
+def film(ticks: int = 31, **changes: Any) -> Film:
     """All move along +x by 5 cm a tick: from (-3, -1) and (-1.5, -1), which are in range, and from (0, -2.5), which is
     in nobody's."""
     pose = np.zeros((ticks, 3, 3), np.float32)
@@ -51,20 +51,20 @@ def film(ticks: int = 31, **given: Any) -> Film:
         "alive": np.ones((ticks, 3), np.bool_),
         "metrics": {"order": np.linspace(0.0, 1.0, ticks), "min_gap": np.full(ticks, np.nan)},
     }
-    return Film(**{**fields, **given})
+    return Film(**{**fields, **changes})
 
 
-def ticks_frame(of: Film, states: Any = None, arena: int = 0) -> pl.DataFrame:
+def ticks_frame(recording: Film, states: Any = None, arena: int = 0) -> pl.DataFrame:
     """A film as the rows of a run folder."""
-    count, robots = of.alive.shape
+    count, robots = recording.alive.shape
     columns = {"arena": pl.Series(np.full(count, arena, np.int32)), "tick": pl.Series(np.arange(count))}
-    columns["time_s"] = pl.Series(of.time_s)
-    for place, name in enumerate(("x_m", "y_m", "heading_rad")):
-        columns[name] = pl.Series(list(of.pose[:, :, place]), dtype=pl.Array(pl.Float32, robots))
-    columns["alive"] = pl.Series(of.alive.tolist(), dtype=pl.Array(pl.Boolean, robots))
+    columns["time_s"] = pl.Series(recording.time_s)
+    for index, name in enumerate(("x_m", "y_m", "heading_rad")):
+        columns[name] = pl.Series(list(recording.pose[:, :, index]), dtype=pl.Array(pl.Float32, robots))
+    columns["alive"] = pl.Series(recording.alive.tolist(), dtype=pl.Array(pl.Boolean, robots))
     noted = [[""] * robots] * count if states is None else states
     columns["state"] = pl.Series(noted, dtype=pl.Array(pl.String, robots))
-    for name, value in of.metrics.items():
+    for name, value in recording.metrics.items():
         columns[name] = pl.Series(value).fill_nan(None)
     return pl.DataFrame(columns)
 
@@ -80,8 +80,8 @@ class Folder:
         return list(self.path.glob(f"{name}.parquet"))
 
     def ticks(self, arena: int | None = None) -> pl.DataFrame:
-        whole = self.path / "ticks.parquet"
-        frame = pl.read_parquet(whole if whole.exists() else self.path / "ticks" / "part-*.parquet")
+        file = self.path / "ticks.parquet"
+        frame = pl.read_parquet(file if file.exists() else self.path / "ticks" / "part-*.parquet")
         return frame if arena is None else frame.filter(pl.col("arena") == arena)
 
 
@@ -128,7 +128,7 @@ def _blocks(data: bytes):
 
 
 def _packet(body: bytes) -> Captured:
-    interface, high, low, captured, length = (_number(body, 4 * place, 4) for place in range(5))
+    interface, high, low, captured, length = (_number(body, 4 * index, 4) for index in range(5))
     assert interface == 0
     padded = captured + -captured % 4
     assert body[20 + captured : 20 + padded] == bytes(padded - captured)
@@ -137,15 +137,15 @@ def _packet(body: bytes) -> Captured:
 
 
 def _options(data: bytes) -> dict[int, list[bytes]]:
-    found: dict[int, list[bytes]] = {}
+    options: dict[int, list[bytes]] = {}
     while data:
         code, length = _number(data, 0, 2), _number(data, 2, 2)
         if code == 0:
             assert data == bytes(4)
             break
-        found.setdefault(code, []).append(data[4 : 4 + length])
+        options.setdefault(code, []).append(data[4 : 4 + length])
         data = data[4 + length + -length % 4 :]
-    return found
+    return options
 
 
 def _number(data: bytes, at: int, size: int) -> int:

@@ -41,12 +41,12 @@ class History:
 
 def measured(metrics: Sequence[Metric], history: History) -> tuple[Array, list[dict[str, Any]]]:
     """Their values in each tick, (ticks, metrics, arenas), and their summary."""
-    observer, found = Metrics(metrics), []
+    observer, values = Metrics(metrics), []
     observer.begin(history.static)
-    for seen in history.ticks:
-        observer.see(seen)
-        found.append(observer.values.copy())
-    return np.array(found), observer.end(None)["metrics"]
+    for tick in history.ticks:
+        observer.see(tick)
+        values.append(observer.values.copy())
+    return np.array(values), observer.end(None)["metrics"]
 
 
 def _place(rng: Any, boundary: str, shape: tuple[int, int, int], spread: float) -> Array:
@@ -60,13 +60,13 @@ def _place(rng: Any, boundary: str, shape: tuple[int, int, int], spread: float) 
     return rolled(place_m) if boundary == "torus" else place_m
 
 
-def _links(rng: Any, of: Static, alive: Array, tick: int) -> ReceptionRecords:
+def _links(rng: Any, run: Static, alive: Array, tick: int) -> ReceptionRecords:
     """Some packets of robots alive to others of their arena, sent in the last few ticks."""
     pairs = [
         (arena, a, b)
         for arena, living in enumerate(alive)
-        for a in range(of.robots)
-        for b in range(of.robots)
+        for a in range(run.robots)
+        for b in range(run.robots)
         if a != b and living[a] and living[b]
     ]
     chosen = rng.permutation(len(pairs))[: rng.integers(0, 12)]
@@ -86,11 +86,11 @@ def _packets(rng: Any, alive: Array, tick: int) -> TransmissionRecords:
     )
 
 
-def _edges(of: Static, place_m: Array, alive: Array) -> Array:
+def _edges(run: Static, place_m: Array, alive: Array) -> Array:
     """Pairs of rows of robots alive of one arena in range."""
     away_m = place_m[:, None] - place_m[None]
-    away_m = rolled(away_m) if of.boundary == "torus" else away_m
-    arena = np.arange(len(place_m)) // of.robots
+    away_m = rolled(away_m) if run.boundary == "torus" else away_m
+    arena = np.arange(len(place_m)) // run.robots
     near = (np.hypot(away_m[..., 0], away_m[..., 1]) < RANGE_M) & (arena[:, None] == arena[None])
     return np.argwhere(np.triu(near & alive[:, None] & alive[None], 1))
 
@@ -99,8 +99,8 @@ def make(seed: int, boundary: str, spread: float, robots: int, arenas: int, dead
     """A run: robots walk, turn, die and live again, touch, note values and send; some are dead all the time."""
     rng = np.random.default_rng(seed)
     lights = [[Light(*rng.uniform(-1.3, 1.3, 2), 1.0) for _ in range(2)] for _ in range(arenas)]
-    of = mixed(static(robots, arenas, lights=lights), int(rng.integers(1, robots + 1)))
-    of = replace(of, boundary=boundary)
+    run = mixed(static(robots, arenas, lights=lights), int(rng.integers(1, robots + 1)))
+    run = replace(run, boundary=boundary)
     rows = robots * arenas
     place_m = _place(rng, boundary, (TICKS, rows, 2), spread)
     heading_rad = rng.uniform(-np.pi, np.pi, (TICKS, rows, 1))
@@ -119,10 +119,10 @@ def make(seed: int, boundary: str, spread: float, robots: int, arenas: int, dead
             "value": np.where(alive & (rng.random(rows) < 0.6), rng.normal(5.0, 2.0, rows), np.nan) if tick else None,
         }
         counts = [{fate: int(rng.integers(0, 5)) for fate in (*FATES, Fate.OUT_OF_RANGE)} for _ in range(arenas)]
-        fields |= {"edges": _edges(of, place_m[tick], alive), "tally": tally(*counts)}
-        fields["finished"], fields["departed"] = _links(rng, of, living, tick), _packets(rng, living, tick)
-        ticks.append(truth(of, tick, **fields))
-    return History(of, tuple(ticks))
+        fields |= {"edges": _edges(run, place_m[tick], alive), "tally": tally(*counts)}
+        fields["finished"], fields["departed"] = _links(rng, run, living, tick), _packets(rng, living, tick)
+        ticks.append(truth(run, tick, **fields))
+    return History(run, tuple(ticks))
 
 
 @st.composite
@@ -144,14 +144,14 @@ def histories(
 
 def at_rest(robots: int, alive: bool) -> History:
     """Robots in the middle that do nothing, say nothing and hear nothing, 1 m from a light."""
-    of = static(robots, lights=[[Light(1.0, 0.0, 1.0)]])
+    run = static(robots, lights=[[Light(1.0, 0.0, 1.0)]])
     fields: dict[str, Any] = {"alive": np.full(robots, alive), "edges": np.zeros((0, 2), np.int64)}
     fields |= {
         "finished": no_rows(ReceptionRecords),
         "departed": no_rows(TransmissionRecords),
         "tally": tally({}, sent=0),
     }
-    return History(of, tuple(truth(of, tick, **fields) for tick in range(TICKS)))
+    return History(run, tuple(truth(run, tick, **fields) for tick in range(TICKS)))
 
 
 def no_rows(table: type) -> Any:
@@ -161,8 +161,8 @@ def no_rows(table: type) -> Any:
 
 def chosen(table: Any, rows: Array, **columns: Array) -> Any:
     """These rows of a table of packets, some of its columns replaced."""
-    taken = {field.name: getattr(table, field.name) for field in fields(table)} | columns
-    return type(table)(**{name: None if column is None else column[rows] for name, column in taken.items()})
+    columns_by_name = {field.name: getattr(table, field.name) for field in fields(table)} | columns
+    return type(table)(**{name: None if column is None else column[rows] for name, column in columns_by_name.items()})
 
 
 def placed(history: History, by_m: tuple[float, float], turn_rad: float = 0.0, mirror: bool = False) -> History:
@@ -174,83 +174,83 @@ def placed(history: History, by_m: tuple[float, float], turn_rad: float = 0.0, m
     c, s = np.cos(turn_rad), np.sin(turn_rad)
     turn, torus = np.array([[c, s], [-side * s, side * c]]), history.static.boundary == "torus"
 
-    def place(at_m: Array) -> Array:
+    def move(at_m: Array) -> Array:
         there_m = at_m @ turn + by_m
         return rolled(there_m) if torus else there_m
 
-    def change(seen: Truth) -> Truth:
-        pose = np.column_stack([place(seen.pose[:, :2]), side * seen.pose[:, 2] + turn_rad])
-        velocity = np.column_stack([seen.velocity[:, :2] @ turn, side * seen.velocity[:, 2]])
-        return replace(seen, pose=pose, velocity=velocity, command=seen.command * (1.0, side, side))
+    def change(truth: Truth) -> Truth:
+        pose = np.column_stack([move(truth.pose[:, :2]), side * truth.pose[:, 2] + turn_rad])
+        velocity = np.column_stack([truth.velocity[:, :2] @ turn, side * truth.velocity[:, 2]])
+        return replace(truth, pose=pose, velocity=velocity, command=truth.command * (1.0, side, side))
 
     lights = tuple(
-        tuple(Light(*place(np.array([one.x_m, one.y_m])).tolist(), one.intensity_m) for one in own)
+        tuple(Light(*move(np.array([one.x_m, one.y_m])).tolist(), one.intensity_m) for one in own)
         for own in history.static.lights
     )
     return replace(history, static=replace(history.static, lights=lights)).each(change)
 
 
-def robots_taken(history: History, taken: Array) -> History:
+def robots_taken(history: History, robots: Array) -> History:
     """The run of these robots (k,) of each arena alone, in this order, which keeps the robots of a group together."""
-    of = history.static
-    rows = (np.arange(of.arenas)[:, None] * of.robots + taken).ravel()
-    place = np.full(of.robots, -1)
-    place[taken] = np.arange(len(taken))
-    row = np.full(of.arenas * of.robots, -1)
+    run = history.static
+    rows = (np.arange(run.arenas)[:, None] * run.robots + robots).ravel()
+    index = np.full(run.robots, -1)
+    index[robots] = np.arange(len(robots))
+    row = np.full(run.arenas * run.robots, -1)
     row[rows] = np.arange(len(rows))
 
-    def change(seen: Truth) -> Truth:
-        own = {name: getattr(seen, name)[rows] for name in ROWS if getattr(seen, name) is not None}
-        own |= {"state": seen.state[rows], "leds": seen.leds[rows]}
-        if seen.edges is not None:
-            own["edges"] = row[seen.edges]
+    def change(truth: Truth) -> Truth:
+        own = {name: getattr(truth, name)[rows] for name in ROWS if getattr(truth, name) is not None}
+        own |= {"state": truth.state[rows], "leds": truth.leds[rows]}
+        if truth.edges is not None:
+            own["edges"] = row[truth.edges]
         for name, columns in (("finished", ("sender", "receiver")), ("departed", ("sender",))):
-            table = getattr(seen, name)
+            table = getattr(truth, name)
             if table is not None:
-                named = {column: place[getattr(table, column)] for column in columns}
+                named = {column: index[getattr(table, column)] for column in columns}
                 own[name] = chosen(table, np.arange(len(table.arena)), **named)
-        return replace(seen, **own)
+        return replace(truth, **own)
 
     groups, start = [], 0
-    for group in of.groups:
-        stop = start + int(np.count_nonzero((taken >= group.start) & (taken < group.stop)))
+    for group in run.groups:
+        stop = start + int(np.count_nonzero((robots >= group.start) & (robots < group.stop)))
         groups.append(replace(group, start=start, stop=stop))
         start = stop
-    names = tuple(of.robot_names[robot] for robot in taken)
-    return replace(history, static=replace(of, groups=tuple(groups), robot_names=names)).each(change)
+    names = tuple(run.robot_names[robot] for robot in robots)
+    return replace(history, static=replace(run, groups=tuple(groups), robot_names=names)).each(change)
 
 
 def packets_shuffled(history: History, rng: Any) -> History:
     """The same edges and packets in each tick, told in another order."""
 
-    def change(seen: Truth) -> Truth:
-        own = {name: getattr(seen, name) for name in ("finished", "departed")}
+    def change(truth: Truth) -> Truth:
+        own = {name: getattr(truth, name) for name in ("finished", "departed")}
         own = {name: chosen(table, rng.permutation(len(table.arena))) for name, table in own.items() if table}
-        return replace(seen, edges=None if seen.edges is None else rng.permutation(seen.edges), **own)
+        return replace(truth, edges=None if truth.edges is None else rng.permutation(truth.edges), **own)
 
     return history.each(change)
 
 
 def arena_alone(history: History, arena: int) -> History:
     """The run of one arena, as if there were no other."""
-    of = history.static
-    rows = slice(arena * of.robots, (arena + 1) * of.robots)
-    only = np.arange(of.arenas) == arena
+    run = history.static
+    rows = slice(arena * run.robots, (arena + 1) * run.robots)
+    only = np.arange(run.arenas) == arena
 
-    def change(seen: Truth) -> Truth:
-        own = {name: getattr(seen, name)[rows] for name in ROWS if getattr(seen, name) is not None}
-        own |= {"running": seen.running[only], "contact_onsets": seen.contact_onsets[only]}
-        own |= {"state": seen.state[rows], "leds": seen.leds[rows]}
-        if seen.edges is not None and seen.tally is not None:
-            own["edges"] = seen.edges[seen.edges[:, 0] // of.robots == arena] - rows.start
-            own["tally"] = type(seen.tally)(*(getattr(seen.tally, field.name)[only] for field in fields(seen.tally)))
+    def change(truth: Truth) -> Truth:
+        own = {name: getattr(truth, name)[rows] for name in ROWS if getattr(truth, name) is not None}
+        own |= {"running": truth.running[only], "contact_onsets": truth.contact_onsets[only]}
+        own |= {"state": truth.state[rows], "leds": truth.leds[rows]}
+        if truth.edges is not None and truth.tally is not None:
+            own["edges"] = truth.edges[truth.edges[:, 0] // run.robots == arena] - rows.start
+            own["tally"] = type(truth.tally)(*(getattr(truth.tally, field.name)[only] for field in fields(truth.tally)))
         for name in ("finished", "departed"):
-            table = getattr(seen, name)
+            table = getattr(truth, name)
             if table is not None:
                 own[name] = chosen(table, table.arena == arena, arena=0 * table.arena)
-        return replace(seen, **own)
+        return replace(truth, **own)
 
-    alone = replace(of, seeds=of.seeds[arena : arena + 1], obstacles=of.obstacles[:1], lights=of.lights[arena:][:1])
+    alone = replace(run, seeds=run.seeds[arena : arena + 1], obstacles=run.obstacles[:1], lights=run.lights[arena:][:1])
     return replace(history, static=alone).each(change)
 
 
@@ -280,17 +280,17 @@ def and_then_nothing(history: History) -> History:
 
 def arena_left(history: History, arena: int, tick: int) -> History:
     """The same, but that this arena has left from a tick on: nobody lives there, and nothing is received or touched."""
-    there = np.arange(history.static.arenas) == arena
-    rows = np.repeat(there, history.static.robots)
+    is_left = np.arange(history.static.arenas) == arena
+    rows = np.repeat(is_left, history.static.robots)
 
-    def change(seen: Truth) -> Truth:
-        if seen.tick < tick:
-            return seen
-        own: dict[str, Any] = {"running": ~there, "alive": seen.alive & ~rows}
-        own["contact_onsets"] = seen.contact_onsets * ~there[:, None]
-        if seen.edges is not None and seen.tally and seen.finished and seen.departed:
-            own |= {name: getattr(seen, name).in_arenas(~there) for name in ("finished", "departed", "tally")}
-            own["edges"] = seen.edges[~rows[seen.edges[:, 0]]]
-        return replace(seen, **own)
+    def change(truth: Truth) -> Truth:
+        if truth.tick < tick:
+            return truth
+        own: dict[str, Any] = {"running": ~is_left, "alive": truth.alive & ~rows}
+        own["contact_onsets"] = truth.contact_onsets * ~is_left[:, None]
+        if truth.edges is not None and truth.tally and truth.finished and truth.departed:
+            own |= {name: getattr(truth, name).in_arenas(~is_left) for name in ("finished", "departed", "tally")}
+            own["edges"] = truth.edges[~rows[truth.edges[:, 0]]]
+        return replace(truth, **own)
 
     return history.each(change)

@@ -104,30 +104,30 @@ def sequences(key: int, bursts: Bursts, links: int = 20, packets: int = 600) -> 
     return LossSequences(np.repeat(np.arange(links), packets), since_s.ravel(), losses(key, bursts, t_s).T.ravel())
 
 
-def ticks(radio: Radio, of: Static, seed: int, count: int = 12) -> Iterator[Truth]:
+def ticks(radio: Radio, run: Static, seed: int, count: int = 12) -> Iterator[Truth]:
     """So many ticks in the loop's order; a robot dies in the midst, and lives again."""
     rng = np.random.default_rng(seed)
-    rows = of.arenas * of.robots
-    medium = make_medium(radio, of.robots, of.seeds, [OBSTACLES] * of.arenas)
+    rows = run.arenas * run.robots
+    medium = make_medium(radio, run.robots, run.seeds, [OBSTACLES] * run.arenas)
     pose, states = scattered(rows, seed), Disruption.none(rows)
     for tick in range(count):
-        at_ns = tick_start_ns(tick, of.rate_hz)
+        at_ns = tick_start_ns(tick, run.rate_hz)
         alive = np.ones(rows, np.bool_)
         alive[0] = not count // 3 <= tick < 2 * count // 3
         pose = pose + rng.normal(0.0, 0.2, pose.shape)
         news = medium.step(at_ns, pose, replace(states, alive=alive))
-        sent = random_traffic(rng, of.arenas, of.robots)
+        sent = random_traffic(rng, run.arenas, run.robots)
         living = np.flatnonzero(alive[sent.sender])
         sent = replace(sent, sender=sent.sender[living], to=sent.to[living], payloads=sent.payloads.select(living))
         medium.send(at_ns, tick, sent)
-        yield truth(of, tick, pose=pose, alive=alive, tally=news.tally, finished=news.finished, departed=news.departed)
+        yield truth(run, tick, pose=pose, alive=alive, tally=news.tally, finished=news.finished, departed=news.departed)
 
 
 @st.composite
 def radio_runs(draw: st.DrawFn) -> tuple[Static, list[Truth]]:
     """A run of any of the radios."""
-    of = static(robots=draw(st.integers(2, 7)), arenas=draw(st.integers(1, 3)))
-    return of, list(ticks(draw(st.sampled_from(RADIOS)), of, draw(st.integers(0, 1000))))
+    run = static(robots=draw(st.integers(2, 7)), arenas=draw(st.integers(1, 3)))
+    return run, list(ticks(draw(st.sampled_from(RADIOS)), run, draw(st.integers(0, 1000))))
 
 
 def rows_of(table, *columns):

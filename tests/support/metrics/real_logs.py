@@ -36,7 +36,7 @@ class Watched(Observer):
 
 
 def as_logs(
-    of: Watched,
+    watched: Watched,
     folder: Path,
     *,
     phase_s: Sequence[float] | None = None,
@@ -45,11 +45,11 @@ def as_logs(
     about: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write a folder per robot; its steps begin `phase_s` after the ticks, its clock is `ahead_s` of the others'."""
-    static = of.static
-    begins_s = np.array([to_s(truth.time_ns) for truth in of.truths])
-    pose = np.stack([truth.pose for truth in of.truths])
+    static = watched.static
+    begins_s = np.array([to_s(truth.time_ns) for truth in watched.truths])
+    pose = np.stack([truth.pose for truth in watched.truths])
     pose[:, :, 2] = np.unwrap(pose[:, :, 2], axis=0)
-    sent, received = _radio(of)
+    sent, received = _radio(watched)
     group = static.groups[0]
     for robot, name in enumerate(static.robot_names):
         own = folder / name
@@ -76,14 +76,14 @@ def as_logs(
         columns = [np.interp(at_s, begins_s, pose[:, robot, axis]) for axis in range(3)]
         lines = [TICKS]
         for tick, time_s in enumerate(at_s.tolist()):
-            truth = of.truths[tick]
+            truth = watched.truths[tick]
             x_m, y_m, heading_rad = (float(column[tick]) for column in columns)
             heading_rad = (heading_rad + np.pi) % (2.0 * np.pi) - np.pi
-            told = f"{x_m:.6f},{y_m:.6f},{heading_rad:.6f}" if tracker else ",,"
+            position = f"{x_m:.6f},{y_m:.6f},{heading_rad:.6f}" if tracker else ",,"
             forward, turn, _ = truth.command[robot]
             value = "" if truth.value is None or np.isnan(truth.value[robot]) else f"{truth.value[robot]}"
             state = truth.states[truth.state[robot]]
-            lines.append(f"{tick},{clock_s + time_s:.9f},0,{told},1,{forward:.6f},{turn:.6f},{state},{value},")
+            lines.append(f"{tick},{clock_s + time_s:.9f},0,{position},1,{forward:.6f},{turn:.6f},{state},{value},")
         (own / "ticks.csv").write_text("\n".join(lines) + "\n")
         rows = [f"{clock_s + to_s(at):.9f},{name},{seq},{to},{size},say,sent" for at, seq, to, size in sent[robot]]
         (own / "sent.csv").write_text("\n".join([SENT, *rows]) + "\n")
@@ -98,16 +98,16 @@ def as_logs(
     return folder
 
 
-def _radio(of: Watched) -> tuple[list[list[Any]], list[list[Any]]]:
+def _radio(watched: Watched) -> tuple[list[list[Any]], list[list[Any]]]:
     """By robot what it sent, and what it received, in the order of time."""
-    names, robots = of.static.robot_names, of.static.robots
+    names, robots = watched.static.robot_names, watched.static.robots
     sent: list[dict[int, Any]] = [{} for _ in range(robots)]
     received: list[list[Any]] = [[] for _ in range(robots)]
     sizes: dict[tuple[int, int], int] = {}
-    for truth in of.truths:
+    for truth in watched.truths:
         if truth.finished is None or truth.departed is None:
             continue
-        ended, gone = truth.finished, truth.departed
+        ended, departed = truth.finished, truth.departed
         for row in range(len(ended.sender)):
             sender, receiver, seq = int(ended.sender[row]), int(ended.receiver[row]), int(ended.sequence[row])
             at, to = int(ended.sent_at_ns[row]), int(ended.to[row])
@@ -118,18 +118,18 @@ def _radio(of: Watched) -> tuple[list[list[Any]], list[list[Any]]]:
                 addressed = names[to] if to >= 0 else ""
                 final = int(ended.final_at_ns[row])
                 received[receiver].append((final, sender, seq, addressed, size, at, float(np.hypot(*apart))))
-        for row in range(len(gone.sender)):
-            sender, seq, to = int(gone.sender[row]), int(gone.sequence[row]), int(gone.to[row])
-            told = (int(gone.on_air_at_ns[row]), seq, names[to] if to >= 0 else "", sizes.get((sender, seq), 14))
-            sent[sender].setdefault(seq, told)
+        for row in range(len(departed.sender)):
+            sender, seq, to = int(departed.sender[row]), int(departed.sequence[row]), int(departed.to[row])
+            packet = (int(departed.on_air_at_ns[row]), seq, names[to] if to >= 0 else "", sizes.get((sender, seq), 14))
+            sent[sender].setdefault(seq, packet)
     return [sorted(of_robot.values()) for of_robot in sent], [sorted(of_robot) for of_robot in received]
 
 
 def watched(*overrides: str, seed: int = 1, out: Path | None = None) -> Watched:
     """All truths of a run."""
-    of = Watched()
-    run(LOSSY, overrides=[*SMALL, METRICS, *overrides], seed=seed, out=out, observers=[of])
-    return of
+    observer = Watched()
+    run(LOSSY, overrides=[*SMALL, METRICS, *overrides], seed=seed, out=out, observers=[observer])
+    return observer
 
 
 @cache
@@ -182,8 +182,8 @@ def as_bag(logs: Path, to: Path, *, commands: bool = True, packets: bool = True,
             text |= {
                 key: row[key].replace("-", "_") for key in ("tx", "to") if row[key] and (key == "to" or "rx" in row)
             }
-            said, first_text = make["String"](first_text or json.dumps(text)), ""
-            messages.append((round(float(row["t_s"]) * 1e9), f"/{name}/packets", "std_msgs/msg/String", said))
+            packet, first_text = make["String"](first_text or json.dumps(text)), ""
+            messages.append((round(float(row["t_s"]) * 1e9), f"/{name}/packets", "std_msgs/msg/String", packet))
     with Writer(to, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         topics: dict[str, Any] = {}
         for at_ns, topic, kind, message in sorted(messages, key=lambda entry: entry[0]):

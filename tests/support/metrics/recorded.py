@@ -15,25 +15,25 @@ from tests.support.clocks import StillClock
 from tests.support.metrics.truths import truth, watch
 
 
-def record(folder: Path, of, ticks, **options):
+def record(folder: Path, run, ticks, **options):
     """Feed these ticks to all recorders of a run folder; the summary's `record`."""
     metrics = Metrics()
     observers = [metrics, *recorders(RecordOptions(folder, metrics, StillClock(), **options))]
-    watch(of, ticks, *observers)
+    watch(run, ticks, *observers)
     parts = {}
     for observer in observers:
         parts.update(observer.end(None))
     return record_summary(parts)
 
 
-def wandering(of, ticks, **fields):
+def wandering(run, ticks, **fields):
     """Robots that are somewhere else in each tick, and named a state."""
     rng = np.random.default_rng(5)
-    rows = of.arenas * of.robots
+    rows = run.arenas * run.robots
     states = ("", "search", "home")
     for tick in range(ticks):
         yield truth(
-            of,
+            run,
             tick,
             pose=rng.uniform(-3.0, 3.0, (rows, 3)),
             velocity=rng.normal(size=(rows, 3)),
@@ -59,7 +59,7 @@ def links(
     )
 
 
-def made_up_summary(ticks: int, *, arenas: int = 1, rate_hz: int = 10, **given: Any) -> dict[str, Any]:
+def made_up_summary(ticks: int, *, arenas: int = 1, rate_hz: int = 10, **fields: Any) -> dict[str, Any]:
     """All that a summary holds, of a run that ended with its duration and measured nothing; `given` in place of it."""
     sim_time_s = ticks / rate_hz
     end = {"ended": "duration", "ticks": ticks, "sim_time_s": sim_time_s, "stop_time_s": None, "stopped_by": None}
@@ -96,7 +96,7 @@ def made_up_summary(ticks: int, *, arenas: int = 1, rate_hz: int = 10, **given: 
         "files": [],
         "inputs": None,
         "live_events": None,
-        **given,
+        **fields,
     }
 
 
@@ -104,13 +104,13 @@ def damaged(parquet: bytes) -> st.SearchStrategy[bytes]:
     """A Parquet file that is cut off, or in which a few bits are turned: as often in its footer as anywhere."""
     last = len(parquet) - 1
     footer = len(parquet) - 8 - int.from_bytes(parquet[-8:-4], "little")
-    place = st.integers(0, last) | st.integers(footer, last)
-    turned = st.lists(st.tuples(place, st.integers(0, 7)), min_size=1, max_size=8).map(lambda at: _turned(parquet, at))
+    index = st.integers(0, last) | st.integers(footer, last)
+    turned = st.lists(st.tuples(index, st.integers(0, 7)), min_size=1, max_size=8).map(lambda at: _turned(parquet, at))
     return turned | turned | st.integers(0, last).map(lambda end: parquet[:end])
 
 
 def _turned(data: bytes, bits: list[tuple[int, int]]) -> bytes:
     changed = bytearray(data)
-    for place, bit in bits:
-        changed[place] ^= 1 << bit
+    for index, bit in bits:
+        changed[index] ^= 1 << bit
     return bytes(changed)

@@ -29,7 +29,7 @@ class Page(HTMLParser):
     fetched: list[str] = field(default_factory=list)
     images: list[bytes] = field(default_factory=list)
     alternatives: list[str] = field(default_factory=list)
-    said: list[str] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
     tables: list[list[list[str]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -60,7 +60,7 @@ class Page(HTMLParser):
         if "style" in self._open:
             return
         if data.strip():
-            self.said.append(data.strip())
+            self.texts.append(data.strip())
         if {"td", "th"} & set(self._open):
             self.tables[-1][-1][-1] += data
 
@@ -95,33 +95,33 @@ def check_alone(page):
     assert len(set(page.ids)) == len(page.ids)
 
 
-def run_folder(folder: Path, of, ticks, ended="duration", summary=True, **options) -> Path:
+def run_folder(folder: Path, run, ticks, ended="duration", summary=True, **options) -> Path:
     """Record these ticks; with a summary as a run writes it, as far as reports read it."""
-    seen = list(ticks)
-    tables = record(folder, of, seen, **options)
+    truths = list(ticks)
+    tables = record(folder, run, truths, **options)
     (folder / "run.json").write_text(json.dumps({"format": 1, "ticks": 50, "cpu": "a CPU", "versions": {"numpy": "2"}}))
-    (folder / "scenario.toml").write_text(f"format = 1\nname = '{of.name}'\n")
+    (folder / "scenario.toml").write_text(f"format = 1\nname = '{run.name}'\n")
     if summary:
         counts = {"clipped_commands": 3, "nan_commands": 0}
-        told = made_up_summary(
-            len(seen),
-            arenas=of.arenas,
-            rate_hz=of.rate_hz,
-            **_observed(of, seen),
+        summary_json = made_up_summary(
+            len(truths),
+            arenas=run.arenas,
+            rate_hz=run.rate_hz,
+            **_observed(run, truths),
             ended=ended,
             counts=counts,
             record=tables,
         )
-        (folder / "summary.json").write_text(json.dumps(told))
+        (folder / "summary.json").write_text(json.dumps(summary_json))
     return folder
 
 
-def _observed(of, seen):
+def _observed(run, truths):
     parts: dict[str, Any] = {"radio": None}
     for observer in (Metrics(), RadioTally(), EventLog()):
-        watch(of, seen, observer)
+        watch(run, truths, observer)
         parts.update(observer.end(None))
-    if of.arenas == 1:
+    if run.arenas == 1:
         parts["metrics"] = parts["metrics"][0]
         parts["radio"] = parts["radio"][0] if parts["radio"] else None
     return parts

@@ -37,26 +37,26 @@ def static(
     )
 
 
-def truth(of: Static, tick: int = 0, **given: Any) -> Truth:
-    rows = of.arenas * of.robots
+def truth(run: Static, tick: int = 0, **values: Any) -> Truth:
+    rows = run.arenas * run.robots
     fields: dict[str, Any] = {
         "tick": tick,
         "time_ns": tick * 100_000_000,
-        "running": np.ones(of.arenas, np.bool_),
+        "running": np.ones(run.arenas, np.bool_),
         "alive": np.ones(rows, np.bool_),
         "pose": np.zeros((rows, 3)),
         "velocity": np.zeros((rows, 3)),
         "command": np.zeros((rows, 3)),
         "state": np.zeros(rows, np.int64),
         "states": ("",),
-        "leds": np.zeros((rows, of.max_leds), np.int64),
+        "leds": np.zeros((rows, run.max_leds), np.int64),
         "readings": {},
-        "contact_onsets": np.zeros((of.arenas, 2), np.int64),
+        "contact_onsets": np.zeros((run.arenas, 2), np.int64),
         "edges": None,
         "tally": None,
         "finished": None,
     }
-    return Truth(**{**fields, **given})
+    return Truth(**{**fields, **values})
 
 
 def poses(heading_rad: Sequence[float]) -> np.ndarray[Any, Any]:
@@ -85,28 +85,28 @@ def finished(sent_at_ns: Sequence[int], final_at_ns: Sequence[int], fate: Fate =
     return ReceptionRecords(zero, zero, zero + 1, zero + 1, zero - 1, zero, sent, sent, final, zero + fate, zero, zero)
 
 
-def watch(of: Static, ticks: Iterable[Truth], *observers: Any) -> None:
+def watch(run: Static, ticks: Iterable[Truth], *observers: Any) -> None:
     """Each of them begins, and sees each tick in their order."""
     for observer in observers:
-        observer.begin(of)
-    for seen in ticks:
+        observer.begin(run)
+    for truth in ticks:
         for observer in observers:
-            observer.see(seen)
+            observer.see(truth)
 
 
-def in_each_tick(of: Static, ticks: Iterable[Truth], *metrics: Metric | str) -> np.ndarray[Any, Any]:
+def in_each_tick(run: Static, ticks: Iterable[Truth], *metrics: Metric | str) -> np.ndarray[Any, Any]:
     """What the metrics say, (ticks, metrics, arenas)."""
-    observer, found = Metrics(metrics), list[np.ndarray[Any, Any]]()
-    observer.begin(of)
-    for seen in ticks:
-        observer.see(seen)
-        found.append(np.array(list(observer.latest.values())))
-    return np.array(found)
+    observer, values = Metrics(metrics), list[np.ndarray[Any, Any]]()
+    observer.begin(run)
+    for truth in ticks:
+        observer.see(truth)
+        values.append(np.array(list(observer.latest.values())))
+    return np.array(values)
 
 
-def measured(name: str, of: Static, seen: Truth) -> list[float]:
+def measured(name: str, run: Static, truth: Truth) -> list[float]:
     """The metric's value in this one tick, per arena."""
-    return in_each_tick(of, [seen], name)[0, 0].tolist()
+    return in_each_tick(run, [truth], name)[0, 0].tolist()
 
 
 def departed(

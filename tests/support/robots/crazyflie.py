@@ -14,7 +14,7 @@ from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.robot.bodies.body import Body, body_from
 from swarmwire.world.gateways.crazyflie import CrazyflieGateway
 from swarmwire.world.gateways.gateway import Gateway
-from tests.support.robots.rig import Fields, Rig, Told
+from tests.support.robots.rig import Commands, Fields, Rig
 
 TICK_NS = NS_PER_S // 50
 ROUNDED_MM = 0.5e-3 + 1e-6
@@ -58,7 +58,7 @@ class CrazyflieRig(Rig):
         super().__init__()
         self._ticking, self._ended = Lock(), Event()
         self._readings, self._alive = Fields(), True
-        self._told = Told()
+        self._commands = Commands()
         self._thread = Thread(target=self._tick_on, name="world", daemon=True)
         self._thread.start()
 
@@ -82,12 +82,12 @@ class CrazyflieRig(Rig):
             self._readings, self._alive = self._readings | fields, alive
             self._tick()
 
-    def told(self) -> Told:
-        """As `Rig.told`, with the newest speeds of all ticks since the last call."""
+    def pop_commands(self) -> Commands:
+        """As `Rig.pop_commands`, with the newest speeds of all ticks since the last call."""
         with self._ticking:
             self._tick()
-            told, self._told = self._told, Told()
-        return told
+            commands, self._commands = self._commands, Commands()
+        return commands
 
     def close(self) -> None:
         """As `Rig.close`; the drivers land first, so the world ends last."""
@@ -100,8 +100,8 @@ class CrazyflieRig(Rig):
         self.tick += 1
         both = {name: np.concatenate([value, -value]) for name, value in self._readings.items()}
         self.gateway.publish(self.tick * TICK_NS, both, np.array([self._alive, True]))
-        told = super().told()
-        self._told = Told(told.speeds or self._told.speeds, self._told.leds | told.leds)
+        commands = super().pop_commands()
+        self._commands = Commands(commands.speeds or self._commands.speeds, self._commands.leds | commands.leds)
 
     def _tick_on(self) -> None:
         while not self._ended.is_set():

@@ -57,8 +57,8 @@ def sensors(**values: Any) -> bytes:
 
 def read(layout: dict[str, tuple[int, str]], packet: bytes) -> dict[str, Any]:
     """What stands at each place."""
-    found = {name: struct.unpack_from(form, packet, offset) for name, (offset, form) in layout.items()}
-    return {name: values[0] if len(values) == 1 else values for name, values in found.items()}
+    fields = {name: struct.unpack_from(form, packet, offset) for name, (offset, form) in layout.items()}
+    return {name: values[0] if len(values) == 1 else values for name, values in fields.items()}
 
 
 def command(**values: Any) -> bytes:

@@ -37,12 +37,12 @@ class ByteByByte:
 class Before:
     """Something comes before what was sent next."""
 
-    def __init__(self, what: bytes) -> None:
-        self._what = what
+    def __init__(self, piece: bytes) -> None:
+        self._piece = piece
 
     def pieces(self, data: bytes) -> Iterator[bytes]:
-        what, self._what = self._what, b""
-        yield what + data
+        piece, self._piece = self._piece, b""
+        yield piece + data
 
 
 class CutAfter:
@@ -52,10 +52,10 @@ class CutAfter:
         self._left, self._hang_up = size, hang_up
 
     def pieces(self, data: bytes) -> Iterator[bytes]:
-        kept = data[: self._left]
-        self._left -= len(kept)
-        yield kept
-        if self._hang_up and len(kept) < len(data):
+        piece = data[: self._left]
+        self._left -= len(piece)
+        yield piece
+        if self._hang_up and len(piece) < len(data):
             raise HangUp
 
 
@@ -127,7 +127,7 @@ class FaultyLink:
             with suppress(OSError):
                 ours.shutdown(socket.SHUT_RDWR)
 
-    def _start(self, what: object, *args: object) -> None:
-        thread = Thread(target=what, args=args, daemon=True)
+    def _start(self, target: object, *args: object) -> None:
+        thread = Thread(target=target, args=args, daemon=True)
         self._threads.append(thread)
         thread.start()

@@ -34,7 +34,7 @@ _SPEED, _PLACE = st.floats(-2.0, 2.0), st.floats(-50.0, 50.0)
 
 
 @dataclass
-class Told:
+class Commands:
     """What the driver's robot was told, since somebody looked last."""
 
     speeds: list[tuple[float, float]] = field(default_factory=list)  # m/s, rad/s to the left
@@ -142,22 +142,22 @@ class Rig(ABC):
             off = np.arctan2(np.sin(off), np.cos(off))
         return bool((np.where(ends, sensed == expected, np.abs(off) <= self.resolution[name])).all())
 
-    def told(self) -> Told:
+    def pop_commands(self) -> Commands:
         """What the driver's robot was told since the last call."""
-        commands, told = self.gateway.pop_commands(), Told()
+        commands, driven = self.gateway.pop_commands(), Commands()
         if commands.drive[0]:
-            told.speeds.append((float(commands.linear_mps[0]), float(commands.angular_radps[0])))
+            driven.speeds.append((float(commands.linear_mps[0]), float(commands.angular_radps[0])))
         leds = commands.leds
-        told.leds.update({int(w): int(c) for r, w, c in zip(leds.rows, leds.slot, leds.value, strict=True) if r == 0})
+        driven.leds.update({int(w): int(c) for r, w, c in zip(leds.rows, leds.slot, leds.value, strict=True) if r == 0})
         assert not commands.drive[NEIGHBOUR]
-        return told
+        return driven
 
     def until_told(self, linear_mps: float, angular_radps: float) -> None:
         """Wait until the robot was told these speeds last; fails if it is not."""
         last: list[Any] = []
 
         def is_told() -> bool:
-            last[:] = self.told().speeds or last
+            last[:] = self.pop_commands().speeds or last
             return bool(last) and self.same_speeds(last[0], (linear_mps, angular_radps))
 
         try:
@@ -221,12 +221,12 @@ def made_up_readings(body: Body, readings: frozenset[str]) -> st.SearchStrategy[
     return st.tuples(*made).map(lambda parts: {name: value for part in parts for name, value in part.items()})
 
 
-def _wide(name: str, width: int, of: st.SearchStrategy[float]) -> st.SearchStrategy[Fields]:
-    return st.lists(of, min_size=width, max_size=width).map(lambda values: {name: np.array([values])})
+def _wide(name: str, width: int, numbers: st.SearchStrategy[float]) -> st.SearchStrategy[Fields]:
+    return st.lists(numbers, min_size=width, max_size=width).map(lambda values: {name: np.array([values])})
 
 
-def _numbers(**of: st.SearchStrategy[float]) -> st.SearchStrategy[Fields]:
-    return st.fixed_dictionaries(of).map(
+def _numbers(**numbers: st.SearchStrategy[float]) -> st.SearchStrategy[Fields]:
+    return st.fixed_dictionaries(numbers).map(
         lambda values: {name.replace("__", "."): np.array([value]) for name, value in values.items()}
     )
 

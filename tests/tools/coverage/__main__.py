@@ -39,9 +39,9 @@ def main() -> int:
     _coverage("json", "-q", "-o", str(DATA / "all.json"))
     _coverage("html", "-q", "-d", str(DATA / "pages"))
     of_parts = _shares(DATA / "all.json")
-    for name, of in of_parts.items():
-        print(f"{name:9} lines {of['lines']:6.1%}  branches {of['branches']:6.1%}")
-    enough = all(of[what] >= least for of in of_parts.values() for what, least in ENOUGH.items())
+    for name, shares in of_parts.items():
+        print(f"{name:9} lines {shares['lines']:6.1%}  branches {shares['branches']:6.1%}")
+    enough = all(shares[unit] >= least for shares in of_parts.values() for unit, least in ENOUGH.items())
     if not enough:
         print(
             f"expected {ENOUGH['lines']:.0%} of lines, {ENOUGH['branches']:.0%} of branches of each; see {DATA}/pages"
@@ -61,7 +61,10 @@ def _shares(report: Path) -> dict[str, dict[str, float]]:
         part = Path(path).parts[Path(path).parts.index("swarmwire") + 1]
         for name in (part, "together"):
             sums[name].update({key: file["summary"][key] for pair in COUNTS.values() for key in pair})
-    return {name: {what: of[run] / of[all_] for what, (run, all_) in COUNTS.items()} for name, of in sums.items()}
+    return {
+        name: {unit: counts[run] / counts[all_] for unit, (run, all_) in COUNTS.items()}
+        for name, counts in sums.items()
+    }
 
 
 if __name__ == "__main__":

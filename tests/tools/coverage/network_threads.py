@@ -13,10 +13,10 @@ _Callback: Any = zenoh.handlers.Callback
 
 def _looked_at(called: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(called)
-    def call(*given: Any) -> Any:
+    def call(*args: Any) -> Any:
         if sys.gettrace() is None:
             sys.settrace(threading.gettrace())
-        return called(*given)
+        return called(*args)
 
     return call
 

@@ -35,14 +35,14 @@ def njit(function: Callable[..., Any] | None = None, **_: Any) -> Callable[..., 
 
 def _plain(function: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(function)
-    def kernel(*given: Any) -> Any:
+    def kernel(*args: Any) -> Any:
         _count()
         if _within.kernel:
-            return function(*given)
+            return function(*args)
         _within.kernel = True
         try:
             with np.errstate(all="ignore"):
-                return function(*map(_with_records, given))
+                return function(*map(_with_records, args))
         finally:
             _within.kernel = False
 

@@ -67,36 +67,36 @@ def mutated_bytes(draw: DrawFn, data: bytes, corpus: Sequence[bytes]) -> bytes:
     return data
 
 
-def _piece(draw: DrawFn, piece: bytes, rest: bytes, corpus: Sequence[bytes]) -> bytes:
+def _piece(draw: DrawFn, piece: bytes, tail: bytes, corpus: Sequence[bytes]) -> bytes:
     """What a piece of the data and the rest after it become."""
     match draw(st.integers(0, 10)):
         case 0:  # deleted
-            return rest
+            return tail
         case 1:  # truncated
             return b""
         case 2:  # a bit flipped
-            return bytes([byte ^ 1 << draw(st.integers(0, 7)) for byte in piece[:1]]) + piece[1:] + rest
+            return bytes([byte ^ 1 << draw(st.integers(0, 7)) for byte in piece[:1]]) + piece[1:] + tail
         case 3:  # overwritten
-            return draw(st.binary(min_size=len(piece[:16]), max_size=16)) + rest
+            return draw(st.binary(min_size=len(piece[:16]), max_size=16)) + tail
         case 4:
             fragment = pick(draw, FRAGMENTS)
-            return fragment + (piece + rest)[len(fragment) :]
+            return fragment + (piece + tail)[len(fragment) :]
         case 5:  # something inserted
-            return pick(draw, FRAGMENTS) + piece + rest
+            return pick(draw, FRAGMENTS) + piece + tail
         case 6:  # repeated
-            return piece * pick(draw, (2, 3, 5)) + rest
+            return piece * pick(draw, (2, 3, 5)) + tail
         case 7:  # moved
-            to = draw(st.integers(0, len(rest)))
-            return rest[:to] + piece + rest[to:]
+            to = draw(st.integers(0, len(tail)))
+            return tail[:to] + piece + tail[to:]
         case 8:  # a number, such as a length, is one more or less, twice or half as large, or as large as it can be
             field, order = piece[:4], pick(draw, ("little", "big"))
             value, mask = int.from_bytes(field, order), (1 << 8 * len(field)) - 1
             value = pick(draw, (value + 1, value - 1, value * 2, value // 2, mask)) & mask
-            return value.to_bytes(len(field), order) + piece[4:] + rest
+            return value.to_bytes(len(field), order) + piece[4:] + tail
         case splice:  # another sample goes on, or a part of it comes in between
             other = pick(draw, corpus)
             other = other[draw(st.integers(0, len(other))) :]
-            return other if splice == 9 else other[: len(piece)] + piece + rest
+            return other if splice == 9 else other[: len(piece)] + piece + tail
 
 
 class Codec(NamedTuple):
@@ -193,8 +193,8 @@ def _of_its_type(draw: DrawFn, node: Any, corpus: Sequence[Any]) -> Any:
         if _is_array(node) and not one_in(draw, 4):
             return _mutated_array(draw, *node)
         at = draw(st.integers(0, len(node)))
-        items, rest = node[at : at + 1], node[at + 1 :]
-        return node[:at] + pick(draw, (rest, (items or [None]) * pick(draw, (2, 3, 400)) + rest, rest[::-1] + items))
+        items, tail = node[at : at + 1], node[at + 1 :]
+        return node[:at] + pick(draw, (tail, (items or [None]) * pick(draw, (2, 3, 400)) + tail, tail[::-1] + items))
     if isinstance(node, str):
         at, text = draw(st.integers(0, len(node))), pick(draw, TEXTS)
         return pick(draw, (node[:at], node[at:], node + node, node[:at] + text + node[at:], text))

@@ -88,20 +88,20 @@ class SmallRun:
         self.frames: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
         self.answers: dict[str, list[bytes]] = {name: [] for name in RUNNERS}
         self.truths: list[Truth] = []
-        self.given: Actions | None = None  # in place of the agents' actions
+        self.replacement: Actions | None = None  # in place of the agents' actions
         self._executors = dict(zip(RUNNERS, map(AgentExecutor, self.parts), strict=True))
         self._roster = joined(Lockstep(list(self.parts), policy=JoinPolicy(memory=self.layouts)))
 
     def do(self, actions: Actions) -> Truth:
         """A tick with these actions."""
-        self.given = actions
+        self.replacement = actions
         return self.loop.step()
 
     def act(
         self, tick: int, readings: Readings, received: ReceivedPackets, tx_status: TxStatuses = NO_TX_STATUSES
     ) -> Actions:
-        if self.given is not None:
-            return self.given
+        if self.replacement is not None:
+            return self.replacement
         self.readings, self.received, self.tx_status = readings, received, tx_status
         for runner, data in self._roster.open_tick(tick, readings, received, tx_status):
             self.frames[runner].append(data)
@@ -141,8 +141,8 @@ def joined(roster: Any, *, ready: bool = True) -> Any:
 def with_all(actions: Actions) -> Actions:
     """The actions with a note, a custom actuator and a custom value."""
     one = actions.rows[:1]
-    place = np.zeros(1, np.int64)
-    note, number, value = (SparseTable(one, place, np.array([set_])) for set_ in (0.0, 0.5, 1.5))
+    row = np.zeros(1, np.int64)
+    note, number, value = (SparseTable(one, row, np.array([set_])) for set_ in (0.0, 0.5, 1.5))
     return replace(actions, notes=replace(note, names=("searching",)), actuators=number, values=value)
 
 

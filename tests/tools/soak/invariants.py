@@ -64,11 +64,11 @@ def check_owners(
             if change["what"] != "restarted":  # a process of its host
                 owner[robot] = change["runner"] if change["what"] in COMES else None
     unowned = sum(runner is None for runner in owner.values())
-    gone = sum(change["what"] in GOES for change in summary["runner_events"])
+    losses = sum(change["what"] in GOES for change in summary["runner_events"])
     counted = sum(summary["counts"].get(name, 0) for name in ("runners_lost", "runners_left"))
-    if gone != counted:
-        raise Broken(f"{gone} runners left or were lost, the counts say {counted}")
-    return f"{len(owner) - unowned} robots played at the end, {unowned} without, after {gone} losses"
+    if losses != counted:
+        raise Broken(f"{losses} runners left or were lost, the counts say {counted}")
+    return f"{len(owner) - unowned} robots played at the end, {unowned} without, after {losses} losses"
 
 
 def check_folder(folder: Path) -> str:
@@ -102,8 +102,8 @@ def check_undisturbed(folder: Path) -> str:
 
 def check_no_process(temporary: Path) -> str:
     """Check that no process of the run is alive, not even an orphan: its temporary files are in this folder."""
-    if left := processes_with(temporary):
-        raise Broken(f"left: {'; '.join(left)}")
+    if processes := processes_with(temporary):
+        raise Broken(f"left: {'; '.join(processes)}")
     return "no process left"
 
 
@@ -119,14 +119,14 @@ def processes_with(temporary: Path) -> list[str]:
 
 def check_no_file(temporary: Path, *, killed: bool = False) -> str:
     """No socket and no temporary folder is left; of a world that was `killed` its sockets are, which the next takes."""
-    left = [
+    files = [
         str(path.relative_to(temporary))
         for path in temporary.rglob("*")
         if not path.is_dir() or not any(path.iterdir())
     ]
-    left = [path for path in left if path not in ("own", "own/swarmwire") and not (killed and path.startswith("sw-"))]
-    if left:
-        raise Broken(f"left among the temporary files: {', '.join(left[:5])} ({len(left)})")
+    files = [path for path in files if path not in ("own", "own/swarmwire") and not (killed and path.startswith("sw-"))]
+    if files:
+        raise Broken(f"left among the temporary files: {', '.join(files[:5])} ({len(files)})")
     return "no socket or temporary file left"
 
 

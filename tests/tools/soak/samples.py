@@ -37,7 +37,7 @@ def growths(samples: pl.DataFrame) -> list[dict[str, Any]]:
 
     Left out is the viewer, which keeps what it was shown, up to the 2 GB that it is given.
     """
-    found: list[dict[str, Any]] = []
+    grown: list[dict[str, Any]] = []
     at_s, end_s = pl.col("at_s"), float(samples["at_s"].to_numpy().max())
     first = at_s.is_between(WARM_UP * end_s, (WARM_UP + STRETCH) * end_s, closed="left")
     last = at_s >= (1.0 - STRETCH) * end_s
@@ -50,6 +50,6 @@ def growths(samples: pl.DataFrame) -> list[dict[str, Any]]:
             if all(map(len, ends)):
                 before, after = (float(np.median(end)) for end in ends)
                 growth = after / before - 1.0 if before else 0.0
-                found.append({"process_name": name, "quantity": quantity, "first": before, "last": after,
+                grown.append({"process_name": name, "quantity": quantity, "first": before, "last": after,
                               "growth": growth, "holds": growth <= limit})  # fmt: skip
-    return found
+    return grown

@@ -46,7 +46,7 @@ DRAWS = st.randoms(note_method_calls=True)
 SHORT_S = st.sampled_from((0.0, 0.1, 0.5, 2.0))
 
 
-def told(*words: object) -> None:
+def report(*words: object) -> None:
     """Print what happens in a schedule; of those that Hypothesis draws, only in the one that fails."""
     (note if currently_in_test_context() else print)(" ".join(map(str, words)))
 
@@ -54,7 +54,7 @@ def told(*words: object) -> None:
 def new_folder() -> Path:
     """A folder for the files of a schedule, which stay if it fails."""
     folder = Path(tempfile.mkdtemp(prefix="schedule-"))
-    told("files:", folder)
+    report("files:", folder)
     return folder
 
 
@@ -70,12 +70,12 @@ class DisturbedRun(RuleBasedStateMachine):
         self.on_loss, self.ending = on_loss, ending
         self._last: dict[str, int] = {}
         self.in_real_time = "--realtime" in options
-        place = "robots.swarm.place={ how = 'disc', radius_m = 2.0 }"
-        values = (place, f"run.on_runner_loss={on_loss}", f"run.runner_timeout_s={TIMEOUT_S}")
+        placement = "robots.swarm.place={ how = 'disc', radius_m = 2.0 }"
+        values = (placement, f"run.on_runner_loss={on_loss}", f"run.runner_timeout_s={TIMEOUT_S}")
         sets = [word for value in values for word in ("--set", value)]
         kind = Kind(**{**vars(kind), "options": (*sets, "--no-rrd", *options)})
         self.site = Site(kind, self.folder / "site", environment(self.temporary))
-        self.troubles = Troubles(self.site, told, TIMEOUT_S)
+        self.troubles = Troubles(self.site, report, TIMEOUT_S)
         self.site.observe(["observer"])
         self.course = Course(self.site)
         self.course.until(self.status, "the run to begin")

@@ -72,13 +72,13 @@ def _signature(node: ast.FunctionDef) -> str:
 @cache
 def modules() -> dict[str, Path]:
     """The file of every module of the five parts."""
-    found: dict[str, Path] = {}
+    paths: dict[str, Path] = {}
     for part in PARTS:
         for path in sorted((ROOT / part / "swarmwire").rglob("*.py")):
             if TEMPLATE not in path.parts:
                 inner = path.relative_to(ROOT / part).with_suffix("")
-                found[".".join(inner.parts).removesuffix(".__init__")] = path
-    return found
+                paths[".".join(inner.parts).removesuffix(".__init__")] = path
+    return paths
 
 
 @cache
@@ -105,15 +105,15 @@ def names_of(node: ast.stmt) -> list[str]:
 
 def described_in(page: str) -> dict[Name, frozenset[str]]:
     """The names that a page of docs/api describes, and which of their members it leaves out."""
-    found: dict[Name, frozenset[str]] = {}
+    entries: dict[Name, frozenset[str]] = {}
     for match in DOCUMENTED.finditer((ROOT / "docs" / "api" / page).read_text(encoding="utf-8")):
         module, _, name = match["path"].rpartition(".")
         left_out = re.search(r":exclude-members: (.*)", match["options"])
         names = {(module, name)}
         if match["kind"] == "module":
             names = _public_names(match["path"])
-        found |= dict.fromkeys(names, frozenset(left_out[1].split(", ") if left_out else ()))
-    return found
+        entries |= dict.fromkeys(names, frozenset(left_out[1].split(", ") if left_out else ()))
+    return entries
 
 
 def _public_names(path: str) -> set[Name]:

@@ -70,16 +70,16 @@ def text() -> str:
         "actions": _frame(encode_actions(1, _actions(), dropped=1, memory=_memory())),
         "packets": _frame(encode_packets(1, 1, 1, _received(), TxStatuses(*_ints(3, STATUSES)))),
         "sent": _frame(encode_sent(1, _actions().sent, missed=1)),
-        f"scene, version {OBSERVED_VERSION}": _frame(*(encode_scene(sample(ObservedRun, left)) for left in LEFT_OUT)),
+        f"scene, version {OBSERVED_VERSION}": _frame(*(encode_scene(sample(ObservedRun, level)) for level in LEFT_OUT)),
         "message, on air": f"{Told(x_m=1.5, count=3, place=-2.25, turns=-1).encode().hex(' ')}\n",
         f"truth, version {OBSERVED_VERSION}": _frame(encode_truth(_glimpse())),
     }
     return f"# version {frames.VERSION}\n" + "".join(f"# {title}\n{lines}" for title, lines in parts.items())
 
 
-def _keys(keys: object, *of: str) -> str:
+def _keys(keys: object, *arguments: str) -> str:
     plain = {name: key for name, key in vars(keys).items() if name != "root"}
-    called = {name: getattr(keys, name)(*of) for name in vars(type(keys)) if not name.startswith("_")}
+    called = {name: getattr(keys, name)(*arguments) for name in vars(type(keys)) if not name.startswith("_")}
     return "".join(f"{name}: {key}\n" for name, key in {**plain, **called}.items())
 
 
@@ -110,9 +110,9 @@ def _readings() -> dict[str, GroupReadings]:
 
 
 def _received() -> ReceivedPackets:
-    given = {f"given {i}": _floats(RECEIVED) for i in range(MEASURES)}
+    measured = {f"given {i}": _floats(RECEIVED) for i in range(MEASURES)}
     return ReceivedPackets(
-        *_ints(4, RECEIVED), given, _ints(RECEIVED), Payloads(np.zeros(BYTES, np.uint8), _ints(SENT + 1))
+        *_ints(4, RECEIVED), measured, _ints(RECEIVED), Payloads(np.zeros(BYTES, np.uint8), _ints(SENT + 1))
     )
 
 

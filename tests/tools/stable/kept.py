@@ -30,15 +30,15 @@ def removed(name: str) -> list[str]:
 
 def _entries(text: str) -> list[str]:
     """Every line, with the heading that it stands under."""
-    found: list[str] = []
+    entries: list[str] = []
     heading = ""
     lines = [line for line in text.splitlines() if line]
     indented = any(line.startswith(" ") for line in lines)  # then what is not indented is a heading
     for line in lines:
         if line.startswith("# ") or (indented and not line.startswith(" ")):
             heading = line
-        found.append(line if line == heading else f"{heading}: {line.strip()}".removeprefix(": "))
-    return found
+        entries.append(line if line == heading else f"{heading}: {line.strip()}".removeprefix(": "))
+    return entries
 
 
 if __name__ == "__main__":

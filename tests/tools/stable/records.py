@@ -43,8 +43,8 @@ def scenario_text() -> str:
     tables = {f"drive, kind = {name}": kind for name, kind in DRIVES.items()}
     tables |= {"leds": Leds, "ros2": Ros2Names, "actuators.*": CustomActuatorSpec}
     tables |= {f"sensors.{name}": kind for name, kind in SENSOR_SPECS.items()}
-    of_body = (of for of in parameters_of_dataclass(Body) if of.name.partition(".")[0] not in ("drive", "leds", "ros2"))
-    parts = ["# a scenario", *_lines(all_keys()), "# a body's sheet", *_lines(of_body)]
+    keys = (key for key in parameters_of_dataclass(Body) if key.name.partition(".")[0] not in ("drive", "leds", "ros2"))
+    parts = ["# a scenario", *_lines(all_keys()), "# a body's sheet", *_lines(keys)]
     for title, kind in tables.items():
         parts += [f"# a body's sheet: {title}", *_lines(parameters_of_dataclass(kind))]
     return "\n".join(parts) + "\n"
@@ -103,10 +103,10 @@ def _recorded() -> dict[str, Any]:
         (Path(folder) / "telling.py").write_text(TELLING, encoding="utf-8")
         agent = f"robots.floor.agent={folder}/telling.py:Telling", "robots.floor.params={}"
         run(DRONES, overrides=[*OVERRIDES, *agent], out=Path(folder) / "run", record=record)
-        found: dict[str, Any] = {}
+        files: dict[str, Any] = {}
         for path in sorted((Path(folder) / "run").iterdir()):
             if path.suffix == ".json":
-                found[path.name] = json.loads(path.read_text(encoding="utf-8"))
+                files[path.name] = json.loads(path.read_text(encoding="utf-8"))
             elif path.suffix == ".parquet":
-                found[path.name] = {name: str(kind) for name, kind in pl.read_parquet_schema(path).items()}
-        return found
+                files[path.name] = {name: str(kind) for name, kind in pl.read_parquet_schema(path).items()}
+        return files

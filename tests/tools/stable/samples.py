@@ -19,11 +19,11 @@ def sample(hint: Any, left_out: str = "nothing") -> Any:
         return PLAIN[hint]
     if is_dataclass(hint):
         hints = get_type_hints(hint)
-        return hint(**{of.name: sample(hints[of.name], left_out) for of in fields(hint)})
+        return hint(**{field.name: sample(hints[field.name], left_out) for field in fields(hint)})
     origin, inner = get_origin(hint), get_args(hint)
     if origin is UnionType:
-        kept = left_out == "nothing" or (left_out == "values" and is_dataclass(inner[0]))
-        return sample(inner[0], left_out) if kept else None
+        is_set = left_out == "nothing" or (left_out == "values" and is_dataclass(inner[0]))
+        return sample(inner[0], left_out) if is_set else None
     if origin is Literal:
         return inner[0]
     if origin in (dict, Mapping):
@@ -38,25 +38,25 @@ def paths_of(value: Any, path: str = "") -> dict[str, set[str]]:
     if path.endswith(".body"):
         return {path: {"a body's sheet"}}
     if isinstance(value, Mapping):
-        found = {path: {"table"}} if path else {}
+        paths = {path: {"table"}} if path else {}
         inner = [(f"{path}.{name}".lstrip("."), item) for name, item in value.items()]
     elif isinstance(value, list | tuple):
-        found = {path: {"list"}}
+        paths = {path: {"list"}}
         inner = [(f"{path}.*", item) for item in value]
     else:
         return {path: {WORDS[type(value)]}}
-    return joined(found, *(paths_of(item, below) for below, item in inner))
+    return joined(paths, *(paths_of(item, below) for below, item in inner))
 
 
 def joined(*several: dict[str, set[str]]) -> dict[str, set[str]]:
     """All paths, in the order in which they first come, with all kinds of each."""
-    found: dict[str, set[str]] = {}
+    merged: dict[str, set[str]] = {}
     for paths in several:
         for path, kinds in paths.items():
-            found[path] = found.get(path, set()) | kinds
-    return found
+            merged[path] = merged.get(path, set()) | kinds
+    return merged
 
 
-def lines_of(found: Mapping[str, set[str]]) -> str:
+def lines_of(paths: Mapping[str, set[str]]) -> str:
     """A line for each path."""
-    return "".join(f"{path}: {' or '.join(sorted(kinds))}\n" for path, kinds in found.items())
+    return "".join(f"{path}: {' or '.join(sorted(kinds))}\n" for path, kinds in paths.items())

@@ -52,7 +52,7 @@ def spread(behaviour: str, body: str) -> dict[str, FloatArray]:
     """What runs with all agents in this process come to, by name, a number for each seed."""
     speeds, overrides = Speeds(), CASES[behaviour].overrides
     arenas = run(scenario(behaviour, body), seeds=SEEDS, overrides=overrides, observers=[speeds]).arenas
-    results = [measured(arena, speeds.of(index)) for index, arena in enumerate(arenas)]
+    results = [measured(arena, speeds.means(index)) for index, arena in enumerate(arenas)]
     return {name: np.array([measures[name] for measures in results]) for name in results[0]}
 
 
@@ -73,7 +73,7 @@ def through_gateway(
         result = driven(scenario(behaviour, body), GATEWAYS[body], out, pace=pace, observers=[speeds], **more)
         assert result.realtime is not None
         if result.realtime.missed_ticks <= MAX_MISSED * result.ticks:
-            return measured(result.arenas[0], speeds.of(0)), result
+            return measured(result.arenas[0], speeds.means(0)), result
     pytest.skip(
         f"more than {MAX_MISSED:.0%} of the ticks missed at every pace: that tells of this machine, not of robots"
     )

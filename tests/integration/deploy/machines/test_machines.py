@@ -53,7 +53,7 @@ def test_machines_with_a_router_between_run_as_one_process_does(tmp_path):
             on(between, "router", "--listen", through, "--connect", at, *options) as router,
             on(far, "world", LOSSY, "--set", SHORT, "--listen", at, "--out", out, "--no-rrd", *options) as world,
         ):
-            router.said("linked with world")
+            router.next_line("linked with world")
             joined = [on(near, "join", through, "--robots", "10", "--name", name, *options) for name in ("r1", "r2")]
             with joined[0] as one, joined[1] as other:
                 assert (world.ended(), one.ended(), other.ended()) == (0, 0, 0), (world.lines, one.lines, other.lines)
@@ -68,7 +68,7 @@ def test_nobody_gets_past_a_machine_without_a_router(tmp_path):
         certs = lab(tmp_path / "ca", {"world": far.addresses}, "r1")
         at = f"tls/{far.addresses[0]}:7447"
         with on(far, "world", LOSSY, "--listen", at, "--out", tmp_path / "out", "--certs", certs) as world:
-            world.said("listens at")
+            world.next_line("listens at")
             with on(near, "join", at, "--name", "r1", "--certs", certs) as stray:
                 assert stray.ended() != 0
             assert "no world answers" in stray.lines[-1]
@@ -82,17 +82,17 @@ def test_runner_that_is_cut_off_is_reported_at_both_ends_and_may_return(tmp_path
         join = "join", at, "--insecure", "--name", "a"
         world = ("world", LOSSY, *settings, "--listen", at, "--insecure", "--out", tmp_path / "run")
         with on(lab, *world) as world:
-            world.said("0 of 20 robots have agents")
+            world.next_line("0 of 20 robots have agents")
             with on(laptop, *join) as cut:
-                world.said("20 robots, 50000 ticks")
-                cut.said("joined run")
+                world.next_line("20 robots, 50000 ticks")
+                cut.next_line("joined run")
                 laptop.link("down")
-                world.said("a was lost with flock-0", "no answer for 3 s")
+                world.next_line("a was lost with flock-0", "no answer for 3 s")
                 assert cut.ended() == 1
                 assert cut.lines[-1] == "the world is gone, or out of reach"
             laptop.link("up")
             with on(laptop, *join) as back:
-                world.said("a returned to flock-0")
+                world.next_line("a returned to flock-0")
                 assert world.stop() == 130
                 assert back.ended() == 0
 

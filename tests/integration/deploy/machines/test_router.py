@@ -40,7 +40,7 @@ def certs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_on_this_machine_it_routes_without_certificates_until_it_is_asked_to_end():
     with on(None, "router", *TCP) as router:
-        assert router.said("listens at").endswith(", calls tcp/127.0.0.1:1")
+        assert router.next_line("listens at").endswith(", calls tcp/127.0.0.1:1")
         assert router.stop() == 0
     assert router.lines[-1] == "router: ended"
     assert not any("warning" in line for line in router.lines)
@@ -48,8 +48,8 @@ def test_on_this_machine_it_routes_without_certificates_until_it_is_asked_to_end
 
 def test_beyond_this_machine_it_warns_each_time_that_it_is_insecure():
     with on(None, "router", "--listen", "tcp/0.0.0.0:0", "--connect", "tcp/127.0.0.1:1", "--insecure") as router:
-        router.said("warning: insecure")
-        router.said("listens at")
+        router.next_line("warning: insecure")
+        router.next_line("listens at")
         assert router.stop() == 0
 
 
@@ -107,7 +107,7 @@ class BehindRouter(Joiners):
     def opened(self, endpoints: tuple[str, ...], run_id: str) -> None:
         router = on(None, "router", "--listen", LOCALHOST[0], "--connect", endpoints[0])
         self.router = self._opened.enter_context(router)
-        self.endpoint = self.router.said("listens at").split()[3].strip(",")
+        self.endpoint = self.router.next_line("listens at").split()[3].strip(",")
         self.start("r1")
 
     def send_router(self, number: signal.Signals) -> None:
@@ -172,8 +172,8 @@ class BehindGuardedRouter(Joiners):
     def _route(self) -> None:
         words = "router", "--listen", self._at, "--connect", self._world, "--certs", self._certs
         router = self._opened.enter_context(on(None, *words))
-        self._at = self.endpoint = router.said("listens at").split()[3].strip(",")
-        router.said("linked with world")
+        self._at = self.endpoint = router.next_line("listens at").split()[3].strip(",")
+        router.next_line("linked with world")
         self.routers.append(router)
 
     def _join(self, name: str, *arguments: str) -> None:
@@ -192,7 +192,7 @@ class BehindGuardedRouter(Joiners):
         if len(self.lost) < len(RUNNERS):
             return
         for name in RUNNERS:
-            code, output = self.said(name)
+            code, output = self.outcome(name)
             assert (code, output.splitlines()[-1]) == (1, "the world is gone, or out of reach")
         self._route()
         for name, robots in self.lost.items():
@@ -210,8 +210,8 @@ def test_run_goes_on_after_its_router_was_killed_and_reports_it(tmp_path):
         simulation = Simulation(LOSSY, overrides=overrides, listening=listening, out=tmp_path / "run")
         simulation.watch(Watcher((lambda truth: truth.tick == 8, joiners.kill_router)))
         result = run_to_end(simulation)
-    assert sorted(joiners.told[2:4]) == [("lost", "r1"), ("lost", "r2")]
-    assert sorted(joiners.told[4:]) == [("returned", "r1"), ("returned", "r2")]
+    assert sorted(joiners.events[2:4]) == [("lost", "r1"), ("lost", "r2")]
+    assert sorted(joiners.events[4:]) == [("returned", "r1"), ("returned", "r2")]
     assert {change.tick for change in result.runner_events[2:]} == {9}
     assert result.counts["runners_lost"] == result.counts["runners_returned"] == 2
     assert result.trajectory_sha256 == run(LOSSY, overrides=overrides).trajectory_sha256

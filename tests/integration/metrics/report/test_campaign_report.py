@@ -182,7 +182,7 @@ def test_limit_of_a_time_is_not_rounded_up_beyond_what_was_observed(tmp_path):
 def test_without_times_nothing_is_said_of_survival(tmp_path):
     sections, shown = report_of(ordinary(tmp_path, times={}))
     assert "Survival" not in sections
-    assert not any("Kaplan" in text for text in shown.said)
+    assert not any("Kaplan" in text for text in shown.texts)
 
 
 def test_failed_and_missing_runs_are_told_with_what_to_do(tmp_path):
@@ -190,7 +190,7 @@ def test_failed_and_missing_runs_are_told_with_what_to_do(tmp_path):
     _, shown = report_of(folder)
     assert ["runs", "19 done, 3 failed, 2 missing"] in shown.table("scenario")
     assert shown.table("error", "runs") == [["the agent of flock-0 failed", "3", "3", "0, 3"]]
-    listings = "\n".join(shown.said)
+    listings = "\n".join(shown.texts)
     assert f"swarmwire repeat {folder} --run 3" in listings
     assert f"swarmwire sweep --resume {folder}" in listings
     assert [row[1] for row in shown.table("radio.loss", "n")] == ["4", "4", "6", "5"]
@@ -232,7 +232,7 @@ def test_constant_and_missing_responses_are_left_out_and_named(tmp_path):
         "gap_m.final": lambda *_: None,
     }
     _, shown = report_of(ordinary(tmp_path, numbers=numbers, times={"never_s": lambda *_: None}))
-    text = " ".join(shown.said)
+    text = " ".join(shown.texts)
     assert "Left out (equal in all runs that have a value): components.final ." in text
     assert "Left out (without a value in any run): gap_m.final and never_s ." in text
 
@@ -297,7 +297,7 @@ def test_labels_stand_in_figures_and_unknown_ones_are_refused(tmp_path):
 
 def test_scenario_name_with_markup_is_escaped_in_a_report(tmp_path):
     _, shown = report_of(ordinary(tmp_path, name="<script>alert(1)</script> & co"))
-    assert "<script>alert(1)</script> & co" in shown.said
+    assert "<script>alert(1)</script> & co" in shown.texts
     check_alone(shown)
 
 

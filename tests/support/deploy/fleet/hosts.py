@@ -226,10 +226,10 @@ async def _print(output: asyncio.StreamReader, to: "asyncssh.SSHWriter[bytes]") 
 
 async def _feed(host: FakeHost, process: "asyncssh.SSHServerProcess[bytes]", to: asyncio.StreamWriter) -> None:
     """Forward the client's input up to the limit."""
-    left = host.cut_after
+    remaining = host.cut_after
     with suppress(OSError, asyncssh.Error):
         while block := await process.stdin.read(1 << 16):
-            if left is not None and (left := left - len(block)) < 0:
+            if remaining is not None and (remaining := remaining - len(block)) < 0:
                 if host.before_cut:
                     host.before_cut()
                 process.channel.get_connection().abort()

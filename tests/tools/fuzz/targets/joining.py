@@ -122,7 +122,7 @@ class Assignments(DocumentTarget):
     def make_samples(self) -> list[bytes]:
         run = small_run()
         memory = AgentExecutor(run.parts[0]).memory([group.name for group in run.parts[0].groups])
-        columns = {name: {column: [*of] for column, of in layout.items()} for name, layout in run.layouts.items()}
+        columns = {name: {column: [*cells] for column, cells in layout.items()} for name, layout in run.layouts.items()}
         memories = ((run.parts[0], encode_memory(memory)), (run.parts[1], None), (run.whole, encode_memory({})))
         return [
             msgpack.packb({**part.as_mapping(), "v": frames.VERSION, "memory": one, "memory_columns": columns, **TIMES})
@@ -152,7 +152,7 @@ class Control(DocumentTarget):
         self.scenario = scenario_from(SCENARIO, "small.toml")
         self.bodies = {group.name: group.body for group in small_run().world.static.groups}
         self._start()
-        return [encode_request(of) for of in (*requests, *(ControlRequest("event", event) for event in EVENTS))]
+        return [*map(encode_request, (*requests, *(ControlRequest("event", event) for event in EVENTS)))]
 
     def feed(self, case: bytes) -> None:
         if self.taken > MAX_EVENTS:
@@ -213,7 +213,7 @@ class PageOrders(DocumentTarget):
         self.adapter: TypeAdapter[Any] = TypeAdapter(Order)
         orders = [{"do": do} for do in ("pause", "resume", "stop")]
         more = [{"do": "step", "n": 3}, {"do": "speed", "factor": 2.0}, {"do": "end", "number": 1}]
-        return [JSON.pack(order) for order in (*orders, *more, *({"do": "event", "event": of} for of in EVENTS))]
+        return [JSON.pack(order) for order in (*orders, *more, *({"do": "event", "event": event} for event in EVENTS))]
 
     def feed(self, case: bytes) -> None:
         if len(case) > MAX_ORDER_BYTES:

@@ -56,7 +56,7 @@ class Epuck2Commands(ByteTarget):
 
     def make_samples(self) -> list[bytes]:
         one, two = (
-            RobotCommand(100, -200, request=of).encoded() for of in (PacketRequest.NOTHING, PacketRequest.SENSORS)
+            RobotCommand(100, -200, request=flag).encoded() for flag in (PacketRequest.NOTHING, PacketRequest.SENSORS)
         )
         steps = RobotCommand(3, 4, request=PacketRequest.SENSORS, settings=RobotSettingsBits.SET_STEPS).encoded()
         return [one, two, steps, one + two + one + two]

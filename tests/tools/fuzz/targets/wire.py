@@ -130,8 +130,8 @@ def _state(roster: Any) -> Any:
     ]
     if isinstance(roster, RealTime):
         arrays = (roster._pending_since_ns, roster._stopped, roster._drive, roster._command, roster.late)
-        kept = len(roster._sent), len(roster._answers)
-        return slots, [array.tobytes() for array in arrays], kept, dict(roster._frame_numbers)
+        counts = len(roster._sent), len(roster._answers)
+        return slots, [array.tobytes() for array in arrays], counts, dict(roster._frame_numbers)
     return slots, sorted(roster._by_runner), roster._tick
 
 
@@ -148,8 +148,8 @@ class ProcessAnswers(ByteTarget):
 
     def make_samples(self) -> list[bytes]:
         run = small_run()
-        whole = run.whole
-        self.processes = Processes(whole, 3, {})
+        assignment = run.whole
+        self.processes = Processes(assignment, 3, {})
         self.processes.act(TICK, run.readings, run.received, run.tx_status)
         self.honest = self.processes.answers[1:]
         self.rows = self.processes.rows[0]

@@ -43,7 +43,7 @@ def test_everything_stands_in_the_page_once():
         about="In one line",
     )
     for text in ("A report", "In one line", "swarmwire sweep", "An open table", "A folded table", "The first figure"):
-        assert text in shown.said, text
+        assert text in shown.texts, text
     assert shown.tables == [[["a", "b"], ["x", "> 1"]], [["c", "d"], ["y", "2"]]]
     counts = {tag: shown.tags.count(tag) for tag in ("h1", "h2", "figure", "img", "details", "pre", "code", "nav")}
     assert counts == {"h1": 1, "h2": 2, "figure": 2, "img": 2, "details": 1, "pre": 1, "code": 1, "nav": 1}
@@ -66,7 +66,7 @@ def test_texts_are_no_markup():
     )
     assert "script" not in shown.tags
     assert "b" not in shown.tags
-    assert shown.said.count(evil) >= 3
+    assert shown.texts.count(evil) >= 3
     assert shown.tables[0][0][0] == evil
 
 

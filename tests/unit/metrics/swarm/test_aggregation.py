@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.metrics.measures.swarm.aggregation import AggregationHop, AggregationRatio, AggregationTime
-from tests.support.metrics.swarms import said, stand, swarms, told
+from tests.support.metrics.swarms import last_values, measure, stand, swarms
 
-RADIUS_M = stand((0, 0)).of.groups[0].body.radius_m
+RADIUS_M = stand((0, 0)).static.groups[0].body.radius_m
 gaps = st.sampled_from([None, 0.01, 0.4, 2.0])
 
 
@@ -25,7 +25,7 @@ def test_aggregation_is_the_largest_component_of_small_gaps(swarm, gap_m):
     for pose, radius_m in swarm.arenas:
         graph = nx.from_numpy_array(close(swarm, pose, radius_m, gap_m))
         values.append(max(map(len, nx.connected_components(graph))) / len(pose) if len(pose) else np.nan)
-    assert said(AggregationRatio(gap_m=gap_m), swarm) == pytest.approx(values, nan_ok=True)
+    assert measure(AggregationRatio(gap_m=gap_m), swarm) == pytest.approx(values, nan_ok=True)
 
 
 @given(swarms(), gaps)
@@ -37,19 +37,19 @@ def test_within_one_hop_it_is_that_of_the_algorithm(swarm, gap_m):
             if not any(robot in flock for flock in flocks):
                 flocks.append({robot} | {other for other in range(len(pose)) if near[robot, other]})
         values.append(max(map(len, flocks)) / len(pose) if flocks else np.nan)
-    assert said(AggregationHop(gap_m=gap_m), swarm) == pytest.approx(values, nan_ok=True)
+    assert measure(AggregationHop(gap_m=gap_m), swarm) == pytest.approx(values, nan_ok=True)
 
 
 def test_within_one_hop_the_numbers_of_robots_decide():
     apart_m = 3.9 * RADIUS_M
-    assert said("aggregation_hop", stand((0, 0), (apart_m, 0), (-apart_m, 0))) == [1.0]
-    assert said("aggregation_hop", stand((-apart_m, 0), (0, 0), (apart_m, 0))) == [pytest.approx(2 / 3)]
+    assert measure("aggregation_hop", stand((0, 0), (apart_m, 0), (-apart_m, 0))) == [1.0]
+    assert measure("aggregation_hop", stand((-apart_m, 0), (0, 0), (apart_m, 0))) == [pytest.approx(2 / 3)]
 
 
 @pytest.mark.parametrize(("diameters", "share"), [(1.99, 1.0), (2.01, 0.5)])
 def test_by_default_the_gap_is_a_diameter_from_surface_to_surface(diameters, share):
     two = stand((0, 0), (2.0 * RADIUS_M * diameters, 0))
-    assert said("aggregation", two) == said("aggregation_hop", two) == [share]
+    assert measure("aggregation", two) == measure("aggregation_hop", two) == [share]
 
 
 TICK_S = 0.1
@@ -61,12 +61,12 @@ def at_ticks(together, robots=5):
     position = np.zeros((*table.shape, robots, 2))
     position[..., 0] = np.where(np.arange(robots) < table[..., None], 0.01, 0.4) * np.arange(robots)
     swarms = [stand(*tick.reshape(-1, 2), arenas=table.shape[1]) for tick in position]
-    return swarms[0].of, [swarm.seen(tick) for tick, swarm in enumerate(swarms)]
+    return swarms[0].static, [swarm.truth(tick) for tick, swarm in enumerate(swarms)]
 
 
 def time_s(together, robots=5, **parameters):
     run, ticks = at_ticks(together, robots)
-    return told(AggregationTime(**parameters), *ticks, of=run)
+    return last_values(AggregationTime(**parameters), *ticks, run=run)
 
 
 @pytest.mark.parametrize(
@@ -79,13 +79,13 @@ def test_aggregation_share_is_rounded_up_to_robots(share, robots, least):
 
 
 def test_by_one_hop_a_chain_is_not_together_and_a_star_is():
-    apart_m = 3.9 * stand((0, 0)).of.groups[0].body.radius_m
+    apart_m = 3.9 * stand((0, 0)).static.groups[0].body.radius_m
     chain = stand(*((apart_m * k, 0) for k in range(5)))
     star = stand((0, 0), (apart_m, 0), (-apart_m, 0), (0, apart_m), (0, -apart_m))
-    ticks = chain.seen(0), star.seen(1)
-    assert told(AggregationTime(), *ticks, of=chain.of) == [0.0]
-    assert told(AggregationTime(reading="hop"), *ticks, of=chain.of) == [pytest.approx(TICK_S)]
-    assert told(AggregationTime(reading="hop", share=0.6), *ticks, of=chain.of) == [0.0]
+    ticks = chain.truth(0), star.truth(1)
+    assert last_values(AggregationTime(), *ticks, run=chain.static) == [0.0]
+    assert last_values(AggregationTime(reading="hop"), *ticks, run=chain.static) == [pytest.approx(TICK_S)]
+    assert last_values(AggregationTime(reading="hop", share=0.6), *ticks, run=chain.static) == [0.0]
 
 
 @settings(max_examples=50)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.metrics.measures.swarm.motion import Oscillation
 from swarmwire.metrics.measures.swarm.order import OrderLocal
-from tests.support.metrics.swarms import away_m, rolled, said, stand, swarms, told
+from tests.support.metrics.swarms import away_m, last_values, measure, rolled, stand, swarms
 from tests.support.metrics.truths import measured, poses, static, truth
 
 
@@ -27,9 +27,9 @@ def efficiency(position, alive=None, boundary="open", arenas=1):
     swarms = [stand(*tick, boundary=boundary, arenas=arenas) for tick in np.asarray(position, float)]
     alive = np.ones((len(swarms), len(swarms[0].pose)), np.bool_) if alive is None else alive
     ticks = [
-        replace(swarm, alive=living).seen(tick) for tick, (swarm, living) in enumerate(zip(swarms, alive, strict=True))
+        replace(swarm, alive=living).truth(tick) for tick, (swarm, living) in enumerate(zip(swarms, alive, strict=True))
     ]
-    return told("path_efficiency", *ticks, of=swarms[0].of)
+    return last_values("path_efficiency", *ticks, run=swarms[0].static)
 
 
 def test_path_efficiency_of_line_return_and_half_circle_is_known():
@@ -89,7 +89,7 @@ def oscillation(turn_radps, alive=None, arenas=1, **parameters):
     run = static(turn.shape[1] // arenas, arenas=arenas)
     command = np.stack([0 * turn, turn, 0 * turn], axis=-1)
     ticks = [truth(run, tick, command=command[tick], alive=alive[tick]) for tick in range(len(turn))]
-    return told(Oscillation(**parameters), *ticks, of=run)
+    return last_values(Oscillation(**parameters), *ticks, run=run)
 
 
 @pytest.mark.parametrize(
@@ -163,20 +163,20 @@ def test_local_order_is_that_of_the_formula(swarm, range_m):
             others = [j for j in range(len(pose)) if j != i and near[i, j]]
             means.append(np.mean([np.cos(pose[i, 2] - pose[j, 2]) for j in others]) if others else 1.0)
         values.append(np.mean(means) if means else np.nan)
-    assert said(OrderLocal(range_m=range_m), swarm) == pytest.approx(values, abs=1e-12, nan_ok=True)
+    assert measure(OrderLocal(range_m=range_m), swarm) == pytest.approx(values, abs=1e-12, nan_ok=True)
 
 
 def test_groups_that_agree_each_within_itself_are_ordered_however_they_differ():
     groups = stand((0, 0, 0), (0.1, 0, 0), (3, 0, np.pi), (3.1, 0, np.pi))
-    assert said("order_local", groups) == [pytest.approx(1.0)]
-    assert said("order", groups) == [pytest.approx(0.0, abs=1e-15)]
+    assert measure("order_local", groups) == [pytest.approx(1.0)]
+    assert measure("order", groups) == [pytest.approx(0.0, abs=1e-15)]
 
 
 def test_headings_at_random_have_no_local_order():
     """A mean of 400 x 190 cosines of pairs, variance 1/2 each and uncorrelated: 5 standard errors, false alarm 6e-7."""
     rng, arenas, robots = np.random.default_rng(1), 400, 20
     pose = np.column_stack([np.zeros((arenas * robots, 2)), rng.uniform(-np.pi, np.pi, arenas * robots)])
-    order = np.array(said("order_local", stand(*pose, arenas=arenas)))
+    order = np.array(measure("order_local", stand(*pose, arenas=arenas)))
     assert order.mean() == pytest.approx(0.0, abs=5 * np.sqrt(0.5 / (arenas * robots * (robots - 1) / 2)))
 
 
@@ -197,17 +197,17 @@ def test_robots_count_by_their_speed():
 @given(swarms())
 def test_cohesion_is_the_largest_distance_to_the_centroid(swarm):
     values = [np.hypot(*away_m(swarm, pose).T).max() if len(pose) else np.nan for pose, _ in swarm.arenas]
-    assert said("cohesion", swarm) == pytest.approx(values, abs=1e-9, nan_ok=True)
+    assert measure("cohesion", swarm) == pytest.approx(values, abs=1e-9, nan_ok=True)
 
 
 @pytest.mark.parametrize("name", ["cohesion", "dispersion", "rotation"])
 def test_places_spread_evenly_over_a_torus_have_no_centroid(name):
     at = (-4, 0), (-2, 0), (0, 0), (2, 0)
-    assert np.isnan(said(name, stand(*at, boundary="torus"))).all()
-    assert np.isfinite(said(name, stand(*at))).all()
+    assert np.isnan(measure(name, stand(*at, boundary="torus"))).all()
+    assert np.isfinite(measure(name, stand(*at))).all()
 
 
-RADIUS_M = stand((0, 0)).of.groups[0].body.radius_m
+RADIUS_M = stand((0, 0)).static.groups[0].body.radius_m
 
 
 def hexagon(rings, apart_m):
@@ -222,15 +222,15 @@ def test_dispersion_is_that_of_the_formula(swarm):
         np.sum(away_m(swarm, pose) ** 2) / (4.0 * np.mean(radius_m**2)) if len(pose) else np.nan
         for pose, radius_m in swarm.arenas
     ]
-    assert said("dispersion", swarm) == pytest.approx(values, rel=1e-6, abs=1e-9, nan_ok=True)
+    assert measure("dispersion", swarm) == pytest.approx(values, rel=1e-6, abs=1e-9, nan_ok=True)
 
 
 @pytest.mark.parametrize(("rings", "least"), [(0, 0.0), (1, 6.0), (2, 48.0), (3, 186.0)])
 def test_hexagonal_packing_has_its_known_second_moment(rings, least):
     """Squares of distances in diameters: 6 x 1, then 6 x 4 + 6 x 3, then 6 x 9 + 12 x 7."""
     packed = stand(*hexagon(rings, 2.0 * RADIUS_M))
-    assert said("dispersion", packed) == [pytest.approx(least, abs=1e-12)]
-    assert said("dispersion", stand(*hexagon(rings, 4.0 * RADIUS_M))) == [pytest.approx(4.0 * least, abs=1e-12)]
+    assert measure("dispersion", packed) == [pytest.approx(least, abs=1e-12)]
+    assert measure("dispersion", stand(*hexagon(rings, 4.0 * RADIUS_M))) == [pytest.approx(4.0 * least, abs=1e-12)]
 
 
 def ring(robots, heading_offset_rad, at=(0.0, 0.0)):
@@ -249,7 +249,7 @@ def test_rotation_is_that_of_the_formula(swarm):
         unit = away / np.where(length_m > 1e-12, length_m, np.inf)[:, None]
         crosses = unit[:, 0] * np.sin(pose[:, 2]) - unit[:, 1] * np.cos(pose[:, 2])
         values.append(abs(crosses.sum()) / len(pose) if len(pose) else np.nan)
-    assert said("rotation", swarm) == pytest.approx(values, abs=1e-6, nan_ok=True)
+    assert measure("rotation", swarm) == pytest.approx(values, abs=1e-6, nan_ok=True)
 
 
 HALF_TURNED = np.arange(12) % 2 * np.pi
@@ -259,9 +259,9 @@ HALF_TURNED = np.arange(12) % 2 * np.pi
     ("offset_rad", "exact"), [(np.pi / 2, 1.0), (-np.pi / 2, 1.0), (0.0, 0.0), (np.pi / 2 + HALF_TURNED, 0.0)]
 )
 def test_rotation_of_a_ring_is_one_only_if_it_mills_one_way(offset_rad, exact):
-    assert said("rotation", stand(*ring(12, offset_rad, at=(1.0, -0.5)))) == [pytest.approx(exact, abs=1e-12)]
+    assert measure("rotation", stand(*ring(12, offset_rad, at=(1.0, -0.5)))) == [pytest.approx(exact, abs=1e-12)]
 
 
 def test_robot_at_the_centroid_adds_nothing_to_rotation():
-    assert said("rotation", stand((1.0, 1.0, 0.3))) == [0.0]
-    assert said("rotation", stand(*ring(4, np.pi / 2), (0.0, 0.0, 1.0))) == [pytest.approx(0.8)]
+    assert measure("rotation", stand((1.0, 1.0, 0.3))) == [0.0]
+    assert measure("rotation", stand(*ring(4, np.pi / 2), (0.0, 0.0, 1.0))) == [pytest.approx(0.8)]

@@ -13,17 +13,17 @@ from swarmwire.metrics.measures.metric import TickView
 from swarmwire.metrics.measures.swarm.contacts import smallest_gap_m
 from swarmwire.metrics.measures.swarm.motion import Deadlocked
 from swarmwire.metrics.measures.swarm.pairs import NearPairs
-from tests.support.metrics.swarms import Swarm, rolled, said, stand, swarms, told
+from tests.support.metrics.swarms import Swarm, last_values, measure, rolled, stand, swarms
 from tests.support.metrics.truths import measured, static, truth
 
 
 def pairs_found(swarm: Swarm, reach_m, finder=None):
-    pairs = (finder or NearPairs(swarm.of, reach_m)).find(TickView(swarm.of, swarm.seen()))
+    pairs = (finder or NearPairs(swarm.static, reach_m)).find(TickView(swarm.static, swarm.truth()))
     return sorted(tuple(sorted(pair)) for pair in pairs.tolist())
 
 
 def all_pairs(swarm: Swarm, reach_m):
-    n = swarm.of.robots
+    n = swarm.static.robots
     pairs = []
     for first in range(0, len(swarm.pose), n):
         apart_m = swarm.apart_m(swarm.pose[first : first + n])
@@ -36,7 +36,7 @@ def all_pairs(swarm: Swarm, reach_m):
 @settings(max_examples=150)
 @given(swarms(least=5), st.sampled_from([0.02, 0.2, 0.9, 1.3, 2.1, 9.0]), st.integers(0, 1000))
 def test_near_pairs_are_those_of_all_pairs_each_once_whatever_the_reaches(swarm, reach_m, seed):
-    reaches_m = reach_m * np.random.default_rng(seed).choice([0.3, 1.0, 1.01], swarm.of.robots)
+    reaches_m = reach_m * np.random.default_rng(seed).choice([0.3, 1.0, 1.01], swarm.static.robots)
     assert pairs_found(swarm, reaches_m) == all_pairs(swarm, reaches_m)
 
 
@@ -45,7 +45,7 @@ def test_near_pairs_of_many_moving_robots_are_found_tick_by_tick(boundary):
     rng = np.random.default_rng(1)
     position = rng.uniform([-4.0, -3.0], [4.0, 3.0], (200, 2))
     reach_m = rng.choice([0.02, 0.3], 200)
-    finder = NearPairs(stand(*position, boundary=boundary).of, reach_m)
+    finder = NearPairs(stand(*position, boundary=boundary).static, reach_m)
     for _ in range(5):
         position = rolled(position + rng.normal(0.0, 0.2, position.shape))
         swarm = stand(*position, boundary=boundary)
@@ -65,11 +65,11 @@ def test_robots_far_outside_an_open_arena_are_found():
 
 def test_near_pairs_are_shared_within_a_tick_only_for_equal_reaches():
     swarm = stand((0.0, 0.0), (1.0, 0.0))
-    wide, as_wide, narrow = (NearPairs(swarm.of, np.full(2, reach_m)) for reach_m in (0.6, 0.6, 0.4))
-    view = TickView(swarm.of, swarm.seen())
+    wide, as_wide, narrow = (NearPairs(swarm.static, np.full(2, reach_m)) for reach_m in (0.6, 0.6, 0.4))
+    view = TickView(swarm.static, swarm.truth())
     assert as_wide.find(view) is wide.find(view)
     assert (len(wide.find(view)), len(narrow.find(view))) == (1, 0)
-    assert wide.find(TickView(swarm.of, swarm.seen(1))) is not wide.find(view)
+    assert wide.find(TickView(swarm.static, swarm.truth(1))) is not wide.find(view)
 
 
 def mean_nearest_m(swarm):
@@ -84,26 +84,26 @@ def mean_nearest_m(swarm):
 @settings(max_examples=150)
 @given(swarms(least=9, most=40))
 def test_nearest_neighbour_is_that_of_all_pairs(swarm):
-    assert said("nearest_neighbour", swarm) == pytest.approx(mean_nearest_m(swarm), abs=1e-12, nan_ok=True)
+    assert measure("nearest_neighbour", swarm) == pytest.approx(mean_nearest_m(swarm), abs=1e-12, nan_ok=True)
 
 
 @pytest.mark.parametrize("boundary", ["walls", "torus"])
 def test_neighbours_of_the_tick_before_change_nothing(boundary):
     rng = np.random.default_rng(1)
     metrics = Metrics(["nearest_neighbour"])
-    metrics.begin(stand(*np.zeros((150, 2)), boundary=boundary).of)
+    metrics.begin(stand(*np.zeros((150, 2)), boundary=boundary).static)
     for tick in range(5):
         swarm = stand(*rng.uniform([-4.0, -3.0], [4.0, 3.0], (150, 2)), boundary=boundary)
-        metrics.see(swarm.seen(tick))
+        metrics.see(swarm.truth(tick))
         assert metrics.latest["nearest_neighbour"].tolist() == pytest.approx(mean_nearest_m(swarm), abs=1e-12)
 
 
 def test_nearest_neighbour_in_a_triangular_lattice_is_its_spacing():
     lattice = [(x + 0.5 * (row % 2) - 4.0, 0.75 * row - 3.0) for row in range(8) for x in range(8)]
-    assert said("nearest_neighbour", stand(*lattice, boundary="torus")) == [pytest.approx(np.hypot(0.5, 0.75))]
+    assert measure("nearest_neighbour", stand(*lattice, boundary="torus")) == [pytest.approx(np.hypot(0.5, 0.75))]
     corners = (-3.9, 0.0), (3.9, 2.9), (3.9, -2.9)
-    assert said("nearest_neighbour", stand(*corners)) == [pytest.approx((5.8 * 2 + np.hypot(7.8, 2.9)) / 3)]
-    across = said("nearest_neighbour", stand(*corners, boundary="torus"))
+    assert measure("nearest_neighbour", stand(*corners)) == [pytest.approx((5.8 * 2 + np.hypot(7.8, 2.9)) / 3)]
+    across = measure("nearest_neighbour", stand(*corners, boundary="torus"))
     assert across == [pytest.approx((0.2 * 2 + np.hypot(0.2, 2.9)) / 3)]
 
 
@@ -114,7 +114,7 @@ def test_robots_at_random_have_the_known_mean():
     """
     arenas, robots = 100, 48
     position = np.random.default_rng(1).uniform([-4.0, -3.0], [4.0, 3.0], (arenas * robots, 2))
-    nearest_m = np.array(said("nearest_neighbour", stand(*position, boundary="torus", arenas=arenas)))
+    nearest_m = np.array(measure("nearest_neighbour", stand(*position, boundary="torus", arenas=arenas)))
     exact = 0.5 * np.sqrt(48.0) * np.exp(lgamma(robots) - lgamma(robots + 0.5))
     error = np.sqrt((4.0 - np.pi) / (4.0 * np.pi * robots / 48.0) / (arenas * robots) * 2.0)
     assert nearest_m.mean() == pytest.approx(exact, abs=5.0 * error)
@@ -180,7 +180,7 @@ def rate_per_h(run, onsets, alive):
         truth(run, tick, contact_onsets=np.column_stack([now, 7 + 0 * now]), alive=living)
         for tick, (now, living) in enumerate(zip(onsets, alive, strict=True))
     ]
-    return told("collision_rate", *ticks, of=run)
+    return last_values("collision_rate", *ticks, run=run)
 
 
 @given(st.integers(0, 1000), st.integers(1, 20), st.sampled_from([0.0, 0.1, 0.9]))
@@ -229,8 +229,8 @@ def after(position, command, alive=None, boundary="walls", arenas=1):
     swarms = [
         replace(stand(*at, boundary=boundary, arenas=arenas), alive=a) for at, a in zip(position, alive, strict=True)
     ]
-    ticks = [swarm.seen(tick, command=command[tick]) for tick, swarm in enumerate(swarms)]
-    return told(WINDOW, *ticks, of=swarms[0].of)
+    ticks = [swarm.truth(tick, command=command[tick]) for tick, swarm in enumerate(swarms)]
+    return last_values(WINDOW, *ticks, run=swarms[0].static)
 
 
 def path(step_m, ticks=11, start=(0.0, 0.0)):

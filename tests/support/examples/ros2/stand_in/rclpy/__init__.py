@@ -11,9 +11,9 @@ from rclpy.node import Node, Wire
 
 def init() -> None:
     """Connect; what stands behind `--ros-args`, such as `-r __ns:=/flock_0` or `-p scanner_deg:=90.0`, is taken."""
-    Node.given = dict(text.split(":=") for text in sys.argv if ":=" in text)
+    Node.parameters = dict(text.split(":=") for text in sys.argv if ":=" in text)
     transport, endpoint = os.environ["ROS_STAND_IN"].split()
-    Wire.opened = Wire(transport, endpoint, Node.given.get("__ns", "/"))
+    Wire.opened = Wire(transport, endpoint, Node.parameters.get("__ns", "/"))
 
 
 def spin(node: Node) -> None:

@@ -87,7 +87,7 @@ class Parameter:
 class Node:
     """A node whose callbacks are called one after the other, as the executor of `rclpy.spin` does."""
 
-    given: ClassVar[dict[str, str]] = {}  # parameters of the command line
+    parameters: ClassVar[dict[str, str]] = {}  # parameters of the command line
 
     def __init__(self, name: str) -> None:
         assert Wire.opened is not None, "rclpy.init() was not called"
@@ -96,7 +96,7 @@ class Node:
         self._timers: list[list[Any]] = []  # period and next time in ns, callback
 
     def declare_parameter(self, name: str, default: float) -> Parameter:
-        return Parameter(float(self.given.get(name, default)))
+        return Parameter(float(self.parameters.get(name, default)))
 
     def get_logger(self) -> Logger:
         return Logger()
