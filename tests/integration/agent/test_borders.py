@@ -38,7 +38,7 @@ FILES = {"control file", "run folder", "written file", "other processes"}
 OPEN = {"agent network": NETWORK | FILES, "default": FILES, "isolate": set[str]()}
 
 
-class Seen(Observer):
+class HonestObserver(Observer):
     """An observer of honest robots and of all notes.
 
     Attributes:
@@ -61,7 +61,7 @@ class HostileRun(NamedTuple):
     """A run with hostile agents."""
 
     result: Result
-    observations: Seen
+    observations: HonestObserver
     lost: dict[str, str]  # reasons by robot
     began_s: float  # UTC since 1970
 
@@ -91,7 +91,7 @@ radio = {{ preset = "unit-disk" }}
 """
     file = folder / "borders.toml"
     file.write_text("\n".join([head, group("honest", "Honest"), group("prey", "Honest"), *hostile_groups]))
-    observations = Seen()
+    observations = HonestObserver()
     simulation = Simulation(file, runners="per-robot", out=folder / "run", observers=[observations], **options)
     simulation.watch(Announcement(folder / "run"))
     result = run_to_end(simulation)

@@ -219,18 +219,18 @@ class Looks(Observer):
     """Keeps every truth."""
 
     def begin(self, static: Static) -> None:
-        self.seen: list[Truth] = []
+        self.truths: list[Truth] = []
 
     def see(self, truth: Truth) -> None:
-        self.seen.append(truth)
+        self.truths.append(truth)
 
 
 def test_robots_of_an_arena_that_left_neither_live_move_nor_send(tmp_path: Path) -> None:
     looks = Looks()
     packed(scenario(tmp_path, "unit-disk"), SEEDS, observers=[looks])
     rows = slice(0, 7)  # of the first arena, which leaves after tick 5
-    last = looks.seen[6]
-    for truth in looks.seen:
+    last = looks.truths[6]
+    for truth in looks.truths:
         running = [truth.tick < OVER.get(seed, TICKS) for seed in SEEDS]
         assert truth.running.tolist() == running
         if truth.tick < OVER[1]:

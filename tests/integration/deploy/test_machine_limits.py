@@ -252,11 +252,11 @@ class Policies(Observer):
     """Observer that asks how the system schedules each runner."""
 
     def __init__(self) -> None:
-        self.found = list[int]()
+        self.numbers = list[int]()
 
     def see(self, truth: Truth) -> None:
         """Ask, in every tick."""
-        self.found = [os.sched_getscheduler(process.pid) for process in processes_of(psutil.Process())]
+        self.numbers = [os.sched_getscheduler(process.pid) for process in processes_of(psutil.Process())]
 
 
 @pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="the system has no scheduling in batches")
@@ -270,4 +270,4 @@ def test_runners_take_turns_in_lockstep_and_start_at_once_in_real_time(realtime:
         realtime=realtime,
         observers=[policies],
     )
-    assert policies.found == [getattr(os, policy)] * 2
+    assert policies.numbers == [getattr(os, policy)] * 2

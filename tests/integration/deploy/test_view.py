@@ -195,12 +195,12 @@ def live_run(folder, *observers, duration_s=3):
 def test_live_view_listens_on_loopback_and_its_death_leaves_the_run_alone(tmp_path, capfd):
     view, addresses, texts = LiveView(tmp_path, web=True), [], []
 
-    def told_where():
+    def has_address():
         texts.append(capfd.readouterr().err)
         return "open http://127.0.0.1:" in "".join(texts)
 
     def look():
-        until(told_where)
+        until(has_address)
         addresses.extend(listening(view.pid))
 
     def kill():

@@ -32,7 +32,7 @@ def _received(*packets: tuple[int, int, float, float, list[float]]) -> ReceivedP
     return ReceivedPackets(np.array(receiver), np.array(sender), k, k, measured, k, payloads)
 
 
-def _seen(io: PolicyIO, received: ReceivedPackets, **readings: Any) -> list[dict[str, float]]:
+def _observed(io: PolicyIO, received: ReceivedPackets, **readings: Any) -> list[dict[str, float]]:
     """What two e-pucks see, by name."""
     layout, observations = PolicyLayout(io, load_body("epuck")), []
     looks = vector_agent_doing(lambda robots: observations.append(layout.observe(robots)), *io.needs)
@@ -53,13 +53,13 @@ def _slots(row: dict[str, float]) -> list[list[float]]:
 
 
 def test_readings_are_scaled_by_their_fields():
-    first, second = _seen(PolicyIO(sensors=("proximity", "compass")), ReceivedPackets.none())
+    first, second = _observed(PolicyIO(sensors=("proximity", "compass")), ReceivedPackets.none())
     assert [first[f"proximity.value[{k}]"] for k in range(8)] == pytest.approx(RAYS[0].tolist())
     assert (first["sin compass.heading_rad"], first["cos compass.heading_rad"]) == pytest.approx(
         (np.sin(0.5), np.cos(0.5))
     )
     lost = {"compass.heading_rad": np.array([np.nan, 0.0]), "proximity.value": np.full((2, 8), np.nan)}
-    first, second = _seen(PolicyIO(sensors=("proximity", "compass")), ReceivedPackets.none(), **lost)
+    first, second = _observed(PolicyIO(sensors=("proximity", "compass")), ReceivedPackets.none(), **lost)
     assert set(first.values()) == {0.0}
     assert second["cos compass.heading_rad"] == 1.0
 
@@ -72,7 +72,7 @@ def test_slots_have_the_newest_packet_of_each_of_the_nearest_senders():
         (1, 7, 0.5, 0, [1]),
         (1, 7, 3, 0, [-1]),
     )
-    none, filled = _seen(io, _received(old, far, near, new))
+    none, filled = _observed(io, _received(old, far, near, new))
     assert _slots(none) == [[0.0] * 5] * 2
     assert _slots(filled) == [pytest.approx([1, 1, 1, 0, 0.25], abs=1e-7), pytest.approx([1, 2, 0, 1, 0.5])]
 
@@ -80,14 +80,14 @@ def test_slots_have_the_newest_packet_of_each_of_the_nearest_senders():
 def test_slots_by_time_have_the_newest_first():
     io = PolicyIO(neighbours=3, order="newest", message=1)
     packets = _received((0, 4, 1, 0, [0.1]), (0, 5, 1, 0, [0.2]), (0, 4, 1, 0, [0.3]), (1, 5, 1, 0, [0.4]))
-    first, second = _seen(io, packets)
+    first, second = _observed(io, packets)
     assert _slots(first) == [pytest.approx([1, 0.3]), pytest.approx([1, 0.2]), [0, 0]]
     assert _slots(second) == [pytest.approx([1, 0.4]), [0, 0], [0, 0]]
 
 
 def test_shared_heading_arrives_relative_to_the_receivers():
     io = PolicyIO(sensors=("compass",), neighbours=1, shared=("compass",))
-    first, second = _seen(
+    first, second = _observed(
         io, _received((0, 1, 1, 0, [np.sin(2.0), np.cos(2.0)]), (1, 0, 1, 0, [np.sin(2.0), np.cos(2.0)]))
     )
     assert _slots(first) == [pytest.approx([1, np.sin(1.5), np.cos(1.5)], abs=1e-6)]

@@ -229,7 +229,7 @@ def taken_up(folder):
     its.finish(2)
 
 
-def faults_told(calls, *arguments):
+def errors_of(calls, *arguments):
     """The errors of those of the calls that refuse what they find."""
     for call in calls:
         try:
@@ -247,7 +247,7 @@ def test_wherever_a_file_is_damaged_one_line_names_it_or_nothing_is_wrong(sound,
     (folder.parent / file).write_bytes(data)
     tables = [str(path) for path in folder.rglob("*.parquet")]
     read, again = lambda path: CampaignFolder(path).runs, lambda path: CampaignRun(path, 1)._before()
-    for error in faults_told((read, again, taken_up), folder):
+    for error in errors_of((read, again, taken_up), folder):
         assert error.where in tables
         assert "\n" not in str(error)
 

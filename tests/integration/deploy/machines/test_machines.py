@@ -136,7 +136,7 @@ class Hostile:
     def __init__(self, name: str, opened: ExitStack) -> None:
         self.name, self._opened = name, opened
         self.received: list[str] = []
-        self._kept: list[object] = []
+        self._entities: list[object] = []
 
     def __call__(self, world: GuardedWorld) -> None:
         session = self._opened.enter_context(world.session_of(self.name))
@@ -151,7 +151,7 @@ class Hostile:
     def _spy(self, session: zenoh.Session, world: GuardedWorld) -> None:
         """On frames to others, their answers, the truth."""
         for key in ("**", world.keys.frame("r0"), world.keys.any_answer, world.seen.truth):
-            self._kept.append(session.declare_subscriber(key, at_once(self._hear)))
+            self._entities.append(session.declare_subscriber(key, at_once(self._hear)))
 
     def _be_asked(self, query: zenoh.Query) -> None:
         self.received.append(f"asked {query.key_expr}")
@@ -169,7 +169,7 @@ class Hostile:
             session.put(keys.frame(name), end, congestion_control=BLOCK, attachment=OWN)
             token = session.liveliness().declare_token(keys.alive(name))
             token.undeclare()
-        self._kept.append(session.liveliness().declare_token(keys.world))
+        self._entities.append(session.liveliness().declare_token(keys.world))
 
     def _ask(self, session: zenoh.Session, world: GuardedWorld) -> None:
         """In others' names, for others' robots, for control and truth: nobody answers; nor is it asked itself."""
@@ -182,7 +182,7 @@ class Hostile:
             keys.any_session_info,
             observer_keys.control,
         ):  # only now: it would be asked by itself
-            self._kept.append(session.declare_queryable(key, at_once(self._be_asked)))
+            self._entities.append(session.declare_queryable(key, at_once(self._be_asked)))
 
     def _flood(self, session: zenoh.Session, keys: Keys) -> None:
         payload = standing(0, 10, AT_TICK)

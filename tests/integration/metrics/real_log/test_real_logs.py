@@ -104,8 +104,8 @@ def test_missing_robots_and_different_agents_are_told(folder):
         (folder / "flock-3" / name).unlink()
     notes = read_real_logs(folder).notes
     assert "flock-3" in notes[0]
-    for told_of in ("other:Agent, swarmwire.agent.behaviours:Flocking", "params"):
-        assert any(told_of in note for note in notes)
+    for message in ("other:Agent, swarmwire.agent.behaviours:Flocking", "params"):
+        assert any(message in note for note in notes)
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_robots_of_different_kinds_of_runs_are_refused_with_file_and_key(folder,
 
 
 @pytest.mark.parametrize(
-    ("name", "row", "told_of"),
+    ("name", "row", "message"),
     [
         ("ticks.csv", "9,soon,0,,,,1,0,0,,,", "t_s"),
         ("ticks.csv", "9,5.0,0,,,,1,0,0,,,", "t_s"),
@@ -142,13 +142,13 @@ def test_robots_of_different_kinds_of_runs_are_refused_with_file_and_key(folder,
         ("sent.csv", "9.0,flock-1,1,,14,say,sent,and,more", ""),
     ],
 )
-def test_rows_that_cannot_be_are_refused_with_their_place(folder, name, row, told_of):
+def test_rows_that_cannot_be_are_refused_with_their_place(folder, name, row, message):
     path = folder / "flock-1" / name
     path.write_text(f"{path.read_text()}{row}\n")
     with pytest.raises(BadInput) as refused:
         read_real_logs(folder)
     assert refused.value.where == str(path)
-    assert told_of in refused.value.key
+    assert message in refused.value.key
 
 
 def test_folder_without_a_real_log_is_refused(folder, tmp_path):

@@ -26,7 +26,7 @@ HASHES = ["a" * 64, "b" * 64]
 DIGEST = sha256("".join(HASHES).encode()).digest()[:8]
 
 
-def seen_ticks(run):
+def run_ticks(run):
     kill = EventRecord(0, 0.0, "kill", False, np.array([False, True, False] * ARENAS))
     ended = links([0, 0, 1], [1, 2, 0], [5, 5, 6], 1, arena=[0, 0, 1], fate=[Fate.RECEIVED, Fate.LOST, Fate.RECEIVED])
     counted = tally({Fate.RECEIVED: 1, Fate.LOST: 1, Fate.OUT_OF_RANGE: 3}, {Fate.RECEIVED: 1})
@@ -37,7 +37,7 @@ def summarise(folder, run, recorded, **changes):
     """The summary of a run of these ticks, as deploy writes it."""
     parts = {}
     for observer in (Metrics(), RadioTally(), EventLog()):
-        watch(run, seen_ticks(run), observer)
+        watch(run, run_ticks(run), observer)
         parts.update(observer.end(tally({Fate.IN_FLIGHT: 4}, {})))
     summary = made_up_summary(TICKS, arenas=ARENAS, record=recorded, trajectory_sha256=HASHES, **parts)
     (folder / "summary.json").write_text(json.dumps({**summary, **changes}))
@@ -46,7 +46,7 @@ def summarise(folder, run, recorded, **changes):
 def fill(folder, **changes):
     """A whole run folder, its summary changed by what is given."""
     run = static(3, arenas=ARENAS)
-    recorded = record(folder, run, seen_ticks(run), packets=changes.pop("share", 1.0))
+    recorded = record(folder, run, run_ticks(run), packets=changes.pop("share", 1.0))
     summarise(folder, run, changes.pop("record", recorded), **changes)
     log = RunLog(folder)
     log.append("begins")

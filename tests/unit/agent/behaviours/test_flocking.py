@@ -30,8 +30,8 @@ RESPONSE = RAYS.response
 DIAMETER_M = 0.07
 ANGLES = [-30, 0, 30, 60, 90, 120, 150, 180, 210, 240, 270, 300]
 STRAIGHT, LEFT, RIGHT = (0.1, 0.0), (0.0, 2.0), (0.0, -2.0)
-Seen = dict[int, float]  # angle of a ray in degrees: distance in diameters
-NOTHING: Seen = {}
+Distances = dict[int, float]  # angle of a ray in degrees: distance in diameters
+NOTHING: Distances = {}
 
 
 def wrapped(x: FloatArray, side: float) -> FloatArray:
@@ -234,7 +234,7 @@ def test_ten_robots_spread_to_the_target_distance_only_with_radio():
     assert spread_m("robots.flock.params={light=0.0}", "radio.loss=1.0") < 0.4
 
 
-def values(rays: Seen) -> np.ndarray:
+def values(rays: Distances) -> np.ndarray:
     distance_m = np.array([rays.get(angle, np.inf) for angle in ANGLES]) * DIAMETER_M
     return np.where(np.isfinite(distance_m), RESPONSE.value(np.minimum(distance_m, 1.0)), 0.0)
 
@@ -246,7 +246,7 @@ class OneMinimalist:
         self._tick = 0
         self._agents = agent_group(group("", [0], body="flockbot", params=dict(params)), MinimalistFlocking)
 
-    def step(self, robots: Seen = NOTHING, walls: Seen = NOTHING) -> tuple[float, float]:
+    def step(self, robots: Distances = NOTHING, walls: Distances = NOTHING) -> tuple[float, float]:
         fields = {"infrared.value": values(robots)[None], "proximity.value": values({**walls, **robots})[None]}
         readings = GroupReadings(np.zeros(1, np.int64), fields)
         actions = self._agents.act((self._tick, self._tick * 10**7, 10**7), readings, ReceivedPackets.none())
@@ -254,7 +254,7 @@ class OneMinimalist:
         return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 
 
-def command(robots: Seen = NOTHING, walls: Seen = NOTHING, **params: float) -> tuple[float, float]:
+def command(robots: Distances = NOTHING, walls: Distances = NOTHING, **params: float) -> tuple[float, float]:
     return OneMinimalist(**params).step(robots, walls)
 
 
@@ -327,7 +327,7 @@ def test_rear_cohesion_needs_a_greater_distance_than_lateral_cohesion(angle, tur
 
 
 def test_minimalist_rules_apply_in_order():
-    everything: Seen = {30: 0.9, 270: 0.9, 60: 2.5, 150: 4.5}
+    everything: Distances = {30: 0.9, 270: 0.9, 60: 2.5, 150: 4.5}
     assert command(everything) == RIGHT  # avoids
     assert command({**everything, 30: 1.5}) == LEFT  # keeps apart
     assert command({90: 0.9, 270: 0.2}) == RIGHT  # from the left before the right
