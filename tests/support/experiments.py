@@ -19,7 +19,7 @@ from swarmwire.deploy.campaigns.sweep import ExecutionOptions, begin_sweep
 from swarmwire.deploy.runs.config import seed_list
 from tests.support.deploy.campaign import InThisProcess
 
-PLACE, NOISE = purpose("place"), purpose("noise")
+POSITION, NOISE = purpose("place"), purpose("noise")
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def mean_order(
 ) -> float:
     """The mean order of a run, between the first and the last of `steps`; range 1, `way` a step."""
     key, index = derive_key("reference", seed), np.arange(robots)
-    x, y, turn = (uniform(key, axis, index, 0, PLACE) for axis in range(3))
+    x, y, turn = (uniform(key, axis, index, 0, POSITION) for axis in range(3))
     x, y, theta = side * x, side * y, 2.0 * np.pi * turn
     orders: list[float] = []
     for step in range(steps[1]):

@@ -185,12 +185,12 @@ def elsewhere(turn: Turn) -> Sequence[bytes]:
 
 def joins(*requests: tuple[str, Any]) -> Callable[[Turn], Sequence[bytes]]:
     def says(turn: Turn) -> Sequence[bytes]:
-        return [*(_asked(turn, name or turn.runner.name, request) for name, request in requests), turn.honest][-1:]
+        return [*(_request(turn, name or turn.runner.name, request) for name, request in requests), turn.honest][-1:]
 
     return says
 
 
-def _asked(turn: Turn, name: str, request: Any) -> bytes:
+def _request(turn: Turn, name: str, request: Any) -> bytes:
     turn.runner.ask(name, request if isinstance(request, bytes) else msgpack.packb(request))
     return b""
 

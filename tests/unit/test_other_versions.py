@@ -31,7 +31,7 @@ from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario
 from tests.support.agent.runners import assigned_robots
-from tests.tools.stable import kept
+from tests.tools.stable import lists
 
 FILES: dict[str, tuple[str, Callable[[Path], Any]]] = {
     "scenario": ("scenario.toml", load_scenario),
@@ -172,22 +172,22 @@ def test_agent_of_another_api_version_is_refused(tmp_path):
 
 DECIDE = (
     "no longer there. If that is wanted, raise the version (docs/stability.md says where it stands), tell users in "
-    "CHANGELOG.md, and write the list again: `python -m tests.tools.stable.kept`."
+    "CHANGELOG.md, and write the list again: `python -m tests.tools.stable.lists`."
 )
 
 
-@pytest.mark.parametrize("name", kept.STABLE)
+@pytest.mark.parametrize("name", lists.STABLE)
 def test_stable_interface_has_no_removals(name: str):
-    assert kept.removed(name) == [], DECIDE
+    assert lists.removed(name) == [], DECIDE
 
 
 def test_stable_interface_accepts_additions_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "keys.txt").write_text("# one\na: number\n# two\na: number\nb: text\n")
-    monkeypatch.setattr(kept, "place_of", lambda name: tmp_path / f"{name}.txt")
+    monkeypatch.setattr(lists, "place_of", lambda name: tmp_path / f"{name}.txt")
     for now, removed in (
         ("# one\na: number\nz: new\n# two\nb: text\na: number\n# three\n", []),
         ("# one\na: number\n# two\nb: text\n", ["# two: a: number"]),
         ("# one\na: number\n# two\na: number\nb: number\n", ["# two: b: text"]),
     ):
-        monkeypatch.setitem(kept.STABLE, "keys", lambda text=now: text)
-        assert kept.removed("keys") == removed
+        monkeypatch.setitem(lists.STABLE, "keys", lambda text=now: text)
+        assert lists.removed("keys") == removed

@@ -132,7 +132,7 @@ def test_runs_with_movable_obstacles_are_the_same_in_every_layout(scenario: Path
     assert run(scenario, seeds=[5, 7]).trajectory_sha256[1:] == alone.trajectory_sha256
 
 
-class Kept(Observer):
+class Values(Observer):
     """Observer that keeps the numbers of all ticks."""
 
     def __init__(self) -> None:
@@ -152,7 +152,7 @@ def values(
     agents: Path, kind: str, runners: int | None, seeds: list[int], out: Path | None = None
 ) -> list[FloatArray | None]:
     """The numbers that agents of this kind note, by tick."""
-    observer = Kept()
+    observer = Values()
     setting = [f"robots.flock.agent={agents}:{kind}", "robots.flock.params={}", "duration_s=3"]
     run_spread(LOSSY, runners, seeds=seeds, overrides=setting, observers=[observer], out=out, record=LEAN)
     return observer.values

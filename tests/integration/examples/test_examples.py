@@ -26,7 +26,7 @@ from swarmwire.deploy import Result, Simulation, repeat, run
 from swarmwire.deploy.runs.config import Listening
 from swarmwire.world.scenario.scenario import Scenario
 from swarmwire.world.scenario_file import load_scenario
-from tests.support.deploy.joiners import HERE, Joiners
+from tests.support.deploy.joiners import LOCALHOST, Joiners
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 GAS = EXAMPLES / "gas" / "gas-leak.toml"
@@ -161,7 +161,7 @@ def with_own(folder: Path, flock: Scenario | Path, **more: Any) -> tuple[Result,
     joiners = Both(folder)
     joiners.first = [("foreign", "--robots", str(OWN)), ("own",)]
     with closing(joiners):
-        result = run(flock, listening=Listening(HERE, observer=joiners), **more)
+        result = run(flock, listening=Listening(LOCALHOST, observer=joiners), **more)
         return result, joiners.outcome("foreign")[0]
 
 

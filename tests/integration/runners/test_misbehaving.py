@@ -18,7 +18,7 @@ from swarmwire.deploy.runs.live_address import Announcement, live_runs, read_liv
 from swarmwire.deploy.runs.result import Result
 from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from tests.support.clocks import until
-from tests.support.deploy.joiners import HERE, Joiners
+from tests.support.deploy.joiners import LOCALHOST, Joiners
 from tests.support.deploy.runs import LOSSY
 from tests.support.runners import BESIDE, EARLY, INSTEAD, Played, Prank, Says, Turn
 
@@ -145,7 +145,7 @@ def listening(
         LOSSY,
         overrides=[*joiners.overrides, *overrides],
         out=folder,
-        listening=Listening(HERE, observer=joiners),
+        listening=Listening(LOCALHOST, observer=joiners),
         record=Recording(rrd=False, tables=False),
     )
     simulation.watch(Announcement(folder))

@@ -30,7 +30,7 @@ from swarmwire.world.backends.runner_reports import RunnerEvent
 from tests.support.agent.runners import EncodedRunner
 from tests.support.deploy.runs import LOSSY, ROOT
 
-HERE = ("tcp/127.0.0.1:0",)
+LOCALHOST = ("tcp/127.0.0.1:0",)
 WANDERER = ROOT / "tests/tools/soak/wanderer.py"  # a step that is lost or made twice shows in its run
 
 
@@ -127,7 +127,7 @@ class Joiners(JoinObserver):
         simulation = Simulation(
             LOSSY,
             overrides=[*self.overrides, *overrides],
-            listening=Listening(HERE, start_with=start_with, observer=self),
+            listening=Listening(LOCALHOST, start_with=start_with, observer=self),
             **more,
         )
         if watcher is not None:

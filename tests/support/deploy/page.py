@@ -99,7 +99,7 @@ class StandIn:
     """Keeps what it was asked for; refuses events that are not known, and is gone once `gone` is set."""
 
     def __init__(self) -> None:
-        self.asked: list[tuple[str, Any]] = []
+        self.orders: list[tuple[str, Any]] = []
         self.tick, self.state, self.gone = 0, "running", False
 
     def status(self) -> dict[str, Any]:
@@ -110,25 +110,25 @@ class StandIn:
                 "measures_ms": 1.5, "alive": 3}  # fmt: skip
 
     def pause(self) -> None:
-        self.asked.append(("pause", None))
+        self.orders.append(("pause", None))
 
     def resume(self) -> None:
-        self.asked.append(("resume", None))
+        self.orders.append(("resume", None))
 
     def step(self, n: int = 1) -> None:
-        self.asked.append(("step", n))
+        self.orders.append(("step", n))
 
     def speed(self, factor: float | None) -> None:
-        self.asked.append(("speed", factor))
+        self.orders.append(("speed", factor))
 
     def stop(self) -> None:
-        self.asked.append(("stop", None))
+        self.orders.append(("stop", None))
 
     def event(self, table: dict[str, Any]) -> int:
         if table.get("do") != "kill":
             raise Refused("do: expected something that can happen")
-        self.asked.append(("event", table))
+        self.orders.append(("event", table))
         return 7
 
     def end(self, number: int) -> None:
-        self.asked.append(("end", number))
+        self.orders.append(("end", number))

@@ -111,7 +111,7 @@ class Looking:
         self.interrupt, self.until, self.seen = Interrupt(), until, []
 
     def begin(self, tuning, trials):
-        self.there = len(trials)
+        self.begun = len(trials)
 
     def see(self, trial):
         self.seen.append(trial.number)

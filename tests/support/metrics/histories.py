@@ -49,7 +49,7 @@ def measured(metrics: Sequence[Metric], history: History) -> tuple[Array, list[d
     return np.array(values), observer.end(None)["metrics"]
 
 
-def _place(rng: Any, boundary: str, shape: tuple[int, int, int], spread: float) -> Array:
+def _positions(rng: Any, boundary: str, shape: tuple[int, int, int], spread: float) -> Array:
     """Walks (ticks, rows, 2) around one point; with a small spread they stay within a quarter of each side of 0."""
     compact = spread < 0.5
     middle_m = np.zeros(2) if compact else rng.uniform(-2.0, 2.0, 2)
@@ -102,7 +102,7 @@ def make(seed: int, boundary: str, spread: float, robots: int, arenas: int, dead
     run = mixed(static(robots, arenas, lights=lights), int(rng.integers(1, robots + 1)))
     run = replace(run, boundary=boundary)
     rows = robots * arenas
-    place_m = _place(rng, boundary, (TICKS, rows, 2), spread)
+    place_m = _positions(rng, boundary, (TICKS, rows, 2), spread)
     heading_rad = rng.uniform(-np.pi, np.pi, (TICKS, rows, 1))
     never = rng.random(robots) < dead
     never[0] = False

@@ -42,14 +42,14 @@ COMMAND: dict[str, tuple[int, str]] = {
     "led8": (17, "<3B"),
     "sound": (20, "<B"),
 }
-REST: dict[str, Any] = {"acc": (0, 0, 800), "ambient": (4000,) * 8, "tof": 8190, "battery": 3440, "selector": 15}
+IDLE: dict[str, Any] = {"acc": (0, 0, 800), "ambient": (4000,) * 8, "tof": 8190, "battery": 3440, "selector": 15}
 COMMAND_BYTES = 21
 
 
 def sensors(**values: Any) -> bytes:
     """104 bytes: a robot at rest in the dark that sees nothing, but for these."""
     packet = bytearray(104)
-    for name, value in (REST | values).items():
+    for name, value in (IDLE | values).items():
         offset, layout = SENSORS[name]
         struct.pack_into(layout, packet, offset, *(value if isinstance(value, tuple) else (value,)))
     return bytes(packet)

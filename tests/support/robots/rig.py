@@ -30,7 +30,7 @@ Fields = dict[str, FloatArray]  # "sensor.field" -> (1,) or (1, width): of the d
 
 NEIGHBOUR = 1  # the other robot of the gateway's group, whose readings are others
 _SHARE = st.floats(0.0, 1.0)
-_SPEED, _PLACE = st.floats(-2.0, 2.0), st.floats(-50.0, 50.0)
+_SPEED, _POSITION = st.floats(-2.0, 2.0), st.floats(-50.0, 50.0)
 
 
 @dataclass
@@ -217,7 +217,7 @@ def sense_until_lost(rig: Rig) -> None:
 
 def made_up_readings(body: Body, readings: frozenset[str]) -> st.SearchStrategy[Fields]:
     """Fields of these sensors, (1,) or (1, width) each; not of odometry, which cannot jump."""
-    made = [_OF[name](body) for name in sorted(readings) if name in _OF]
+    made = [_FIELDS[name](body) for name in sorted(readings) if name in _FIELDS]
     return st.tuples(*made).map(lambda parts: {name: value for part in parts for name, value in part.items()})
 
 
@@ -272,7 +272,7 @@ def _battery(body: Body) -> st.SearchStrategy[Fields]:
     return _SHARE.map(fields)
 
 
-_OF: dict[str, Callable[[Body], st.SearchStrategy[Fields]]] = {
+_FIELDS: dict[str, Callable[[Body], st.SearchStrategy[Fields]]] = {
     "proximity": _proximity,
     "light": _light,
     "ground": _ground,
@@ -281,6 +281,6 @@ _OF: dict[str, Callable[[Body], st.SearchStrategy[Fields]]] = {
     "bumper": lambda _: st.sampled_from([0.0, 1.0]).map(lambda pressed: {"bumper.pressed": np.array([pressed])}),
     "compass": lambda _: _numbers(compass__heading_rad=st.floats(-pi, pi)),
     "flow": lambda _: _numbers(flow__forward_mps=_SPEED, flow__left_mps=_SPEED),
-    "positioning": lambda _: _numbers(positioning__x_m=_PLACE, positioning__y_m=_PLACE),
+    "positioning": lambda _: _numbers(positioning__x_m=_POSITION, positioning__y_m=_POSITION),
     "battery": _battery,
 }

@@ -79,8 +79,8 @@ class SmallRun:
         kinds = {name: load_agent(agent) for name, agent in agents.items()}
         self.world = World(scenario, (1,), {name: kind.needs for name, kind in kinds.items()})
         self.loop = Loop(self.world, new_medium(scenario, self.world, None), self, ())
-        self.whole = full_assignment(scenario, self.world.static, agents)
-        self.parts: Sequence[Assignment] = split(self.whole, len(RUNNERS))
+        self.assignment = full_assignment(scenario, self.world.static, agents)
+        self.parts: Sequence[Assignment] = split(self.assignment, len(RUNNERS))
         self.layouts: Mapping[str, Layout] = {name: layout_of(kind) for name, kind in kinds.items()}
         self.readings: Readings = {}
         self.received = ReceivedPackets.none()
@@ -116,7 +116,9 @@ class SmallRun:
 
     def _answer(self, runner: str, data: bytes) -> bytes:
         executor, frame = self._executors[runner], frame_codec.decode(data)
-        readings, received, tx_status = decode_tick(frame, self.whole.measures or (), readings_of(self.parts, runner))
+        readings, received, tx_status = decode_tick(
+            frame, self.assignment.measures or (), readings_of(self.parts, runner)
+        )
         actions = executor.act(frame.tick, readings, received, tx_status)
         return encode_actions(frame.tick, with_all(actions), memory=executor.memory(readings))
 

@@ -21,10 +21,10 @@ Name = tuple[str, str]  # module, and name within it
 
 def text() -> str:
     """A class or function a paragraph, in the order of its name; what it is made of a line each."""
-    return "\n".join(_told(name, left_out) for name, left_out in sorted(described_in(PAGE).items()))
+    return "\n".join(_description(name, left_out) for name, left_out in sorted(described_in(PAGE).items()))
 
 
-def _told(name: Name, left_out: frozenset[str]) -> str:
+def _description(name: Name, left_out: frozenset[str]) -> str:
     module, inner = made_in(name)
     node = next(node for node in tree_of(modules()[module]).body if inner in names_of(node))
     head = f"{'.'.join(name)}\n"
@@ -47,14 +47,14 @@ def _members(kind: type[Any]) -> dict[str, str]:
 
 def _member(item: ast.stmt) -> list[tuple[str, str]]:
     if isinstance(item, ast.FunctionDef) and item.name == "__init__":
-        return [(name, name) for name in _kept(item)]
+        return [(name, name) for name in _attributes(item)]
     if isinstance(item, ast.FunctionDef):
         shown = not item.name.startswith("_") or item.name in SPOKEN
         return [(item.name, _signature(item))] if shown else []
     return [(name, ast.unparse(item)) for name in names_of(item) if not name.startswith("_")]
 
 
-def _kept(init: ast.FunctionDef) -> list[str]:
+def _attributes(init: ast.FunctionDef) -> list[str]:
     """The public attributes that it sets."""
     stored = (node for node in ast.walk(init) if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store))
     return [node.attr for node in stored if not node.attr.startswith("_")]

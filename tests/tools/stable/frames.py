@@ -23,7 +23,7 @@ from tests.tools.stable.samples import LEFT_OUT, joined, lines_of, paths_of, sam
 
 # Lengths of axes, each its own, so that a shape can be told in words.
 ARENAS, ROBOTS, TOLD_OF, RECEIVED, SENT, STATUSES, MEASURES, BYTES, WIDE = 11, 13, 17, 19, 23, 29, 31, 37, 41
-SERIES, EDGES, LINKS, LEDS, MOVABLE, NOTED, SWITCHED, ACTUATED, TOLD = 43, 47, 53, 59, 61, 67, 71, 73, 79
+SERIES, EDGES, LINKS, LEDS, MOVABLE, NOTED, SWITCHED, ACTUATED, REPORTED = 43, 47, 53, 59, 61, 67, 71, 73, 79
 AXES = {
     ARENAS: "arenas",
     ARENAS * ROBOTS: "robots",
@@ -43,7 +43,7 @@ AXES = {
     NOTED: "noted",
     SWITCHED: "switched",
     ACTUATED: "actuated",
-    TOLD: "told",
+    REPORTED: "told",
     len(Fate): "fates",
 }
 
@@ -124,7 +124,7 @@ def _actions() -> Actions:
         *_floats(3, TOLD_OF),
         SentPackets(*_ints(2, SENT), payloads, _ints(SENT)),
         SparseTable(*_ints(2, NOTED), _floats(NOTED), ("",)),
-        *(SparseTable(*_ints(2, k), _floats(k)) for k in (SWITCHED, ACTUATED, TOLD, SWITCHED)),
+        *(SparseTable(*_ints(2, k), _floats(k)) for k in (SWITCHED, ACTUATED, REPORTED, SWITCHED)),
     )
 
 

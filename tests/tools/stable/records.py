@@ -51,10 +51,10 @@ def scenario_text() -> str:
 
 
 def _lines(keys: Iterable[CatalogueParameter]) -> list[str]:
-    return [f"{key.name}: {key.expected}{f' in {key.unit}' if key.unit else ''}; {_given(key)}" for key in keys]
+    return [f"{key.name}: {key.expected}{f' in {key.unit}' if key.unit else ''}; {_default(key)}" for key in keys]
 
 
-def _given(key: CatalogueParameter) -> str:
+def _default(key: CatalogueParameter) -> str:
     return "required" if key.required else f"default {key.value!r}"
 
 

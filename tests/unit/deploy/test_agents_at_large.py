@@ -10,7 +10,7 @@ from swarmwire.deploy import Result, run
 from swarmwire.deploy.runs import backends
 from swarmwire.deploy.runs.config import Listening
 from swarmwire.deploy.runs.simulation import Simulation
-from tests.support.deploy.joiners import HERE, WANDERER, EncodedJoiners, Watcher, moves
+from tests.support.deploy.joiners import LOCALHOST, WANDERER, EncodedJoiners, Watcher, moves
 from tests.support.deploy.runs import LOSSY
 from tests.support.world.locksteps import EncodedBackend
 
@@ -240,11 +240,11 @@ def test_runner_that_leaves_a_run_set_to_stop_ends_it(played):
     [
         (Listening(("tcp/0.0.0.0:0",)), [], "endpoints"),
         (Listening(("nonsense",)), [], "endpoints"),
-        (Listening(HERE, observed=("tcp/10.0.0.5:1",)), [], "observed"),
-        (Listening(HERE, observed=HERE), [], "observed"),
-        (Listening(HERE, start_with=21), [], "start_with"),
-        (Listening(HERE, start_with=5), [], "run.on_runner_loss"),
-        (Listening(HERE, start_with=5), ["run.on_runner_loss=wait"], "run.on_runner_loss"),
+        (Listening(LOCALHOST, observed=("tcp/10.0.0.5:1",)), [], "observed"),
+        (Listening(LOCALHOST, observed=LOCALHOST), [], "observed"),
+        (Listening(LOCALHOST, start_with=21), [], "start_with"),
+        (Listening(LOCALHOST, start_with=5), [], "run.on_runner_loss"),
+        (Listening(LOCALHOST, start_with=5), ["run.on_runner_loss=wait"], "run.on_runner_loss"),
     ],
 )
 def test_listening_that_cannot_be_is_refused(listening, overrides, key):

@@ -109,7 +109,6 @@ def test_speed_limit_is_kept_until_it_is_lifted() -> None:
 def test_speed_limit_does_not_hold_a_slow_run_or_let_it_rush_later() -> None:
     clock, controls, _, _ = controlled()
     controls.speed = 1.0
-    controls._asked = True
     for tick in range(4):
         controls.wait(tick, never)
         clock.time_ns += 3 * TICK_NS

@@ -23,7 +23,7 @@ from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from tests.support.deploy.campaign import InThisProcess, children, cluster, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
 
-ASKED = {"seeds": 4, "vary": {"radio.loss": [0.0, 0.5]}, "batch": 2}
+OPTIONS = {"seeds": 4, "vary": {"radio.loss": [0.0, 0.5]}, "batch": 2}
 LONG = ["duration_s=100000", "robots.pair.params.share=0.0"]
 ODD = """
 from swarmwire.deploy.runs.record import provenance
@@ -45,7 +45,7 @@ def reference(tmp_path_factory):
     scenario_in(folder, "stumbling.py:Stumbling")
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
-        assert sweep(folder / "two.toml", out=folder / "c", **ASKED).failed
+        assert sweep(folder / "two.toml", out=folder / "c", **OPTIONS).failed
     return folder
 
 
@@ -85,7 +85,7 @@ def same(folder, reference):
 
 
 def test_dask_cluster_gives_the_rows_and_series_of_one_machine(tmp_path, reference, one_worker):
-    done = sweep(reference / "two.toml", out=tmp_path / "c", executor=one_worker.name, **ASKED)
+    done = sweep(reference / "two.toml", out=tmp_path / "c", executor=one_worker.name, **OPTIONS)
     assert done.is_over
     same(tmp_path / "c", reference)
     (worker,) = workers_of(tmp_path / "c")
@@ -107,7 +107,7 @@ def test_ctrl_c_ends_what_is_under_way_on_the_workers(tmp_path, reference, one_w
         done = sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, overrides=LONG)
     assert (done.done, done.is_over) == (0, False)
     # The worker does one task at a time: another campaign ends only if the run of 100,000 s is no more.
-    assert sweep(reference / "two.toml", out=tmp_path / "next", executor=one_worker.name, **ASKED).is_over
+    assert sweep(reference / "two.toml", out=tmp_path / "next", executor=one_worker.name, **OPTIONS).is_over
     same(tmp_path / "next", reference)
 
 
@@ -141,7 +141,7 @@ def test_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference):
 
         done = sweep(
             reference / "two.toml", out=tmp_path / "c", executor=opened.name, observer=Observer(kill_it),
-            **{**ASKED, "batch": 1},
+            **{**OPTIONS, "batch": 1},
         )  # fmt: skip
         assert done.is_over
         assert len(workers_of(tmp_path / "c")) == 2
@@ -160,7 +160,7 @@ def test_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference)
 
         done = sweep(
             reference / "two.toml", out=tmp_path / "c", executor=opened.name, observer=Observer(freeze_it),
-            **{**ASKED, "batch": 1},
+            **{**OPTIONS, "batch": 1},
         )  # fmt: skip
         assert done.is_over
         assert len(workers_of(tmp_path / "c")) == 2

@@ -22,10 +22,10 @@ from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, s
 from tests.support.metrics.recorded import damaged
 
 VARY = {"radio.loss": [0.0, 0.5]}
-ASKED = {"seeds": 2, "vary": VARY, "batch": 2}
+OPTIONS = {"seeds": 2, "vary": VARY, "batch": 2}
 WRITES = 5  # two tasks of rows and series each, and the table
 FULL = OSError(errno.ENOSPC, "No space left on device")
-ASKED_SINGLY = {"seeds": 2, "vary": VARY, "batch": 1}
+SINGLE_OPTIONS = {"seeds": 2, "vary": VARY, "batch": 1}
 
 
 class Killed(BaseException):
@@ -38,7 +38,7 @@ def undisturbed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("undisturbed")
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
-        sweep(scenario_in(folder, "stumbling.py:Stumbling"), out=folder / "whole", **ASKED)
+        sweep(scenario_in(folder, "stumbling.py:Stumbling"), out=folder / "whole", **OPTIONS)
     return folder / "whole"
 
 
@@ -74,7 +74,7 @@ def test_whichever_write_was_the_last_nothing_is_lost_or_there_twice(tmp_path, s
     with monkeypatch.context() as patched:
         tried = dying_at(patched, count, Killed())
         with pytest.raises(Killed):
-            sweep(stumbling, out=folder, **ASKED)
+            sweep(stumbling, out=folder, **OPTIONS)
     assert len(tried) == count + 1
     before, rows = rows_in(folder), rows_in(campaign)
     assert len(before) == 2 * (count // 2)
@@ -151,7 +151,7 @@ def test_full_disk_loses_no_finished_runs_of_a_sweep(tmp_path, scenario, executo
     with monkeypatch.context() as patched:
         dying_at(patched, count, FULL)
         with pytest.raises(StorageFailed) as error:
-            sweep(scenario, out=folder, **ASKED)
+            sweep(scenario, out=folder, **OPTIONS)
     assert str(error.value).startswith(f"{folder}: ")
     assert "No space left on device" in str(error.value)
     assert str(error.value).endswith(f"swarmwire sweep --resume {folder}")
@@ -174,7 +174,7 @@ def test_series_that_cannot_be_joined_are_no_loss_either(tmp_path, scenario, exe
     with monkeypatch.context() as patched:
         patched.setattr(pl.LazyFrame, "sink_parquet", full)
         with pytest.raises(StorageFailed, match="No space left"):
-            sweep(scenario, out=tmp_path / "c", **ASKED)
+            sweep(scenario, out=tmp_path / "c", **OPTIONS)
     assert len(rows_in(tmp_path / "c")) == 4
     assert not list((tmp_path / "c" / "series").glob("worker-*"))
     assert resume(tmp_path / "c").is_over
@@ -188,10 +188,10 @@ def sound(tmp_path_factory):
     scenario = scenario_in(folder)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(sweeping, "open_executor", lambda *_: InThisProcess())
-        sweep(scenario, out=folder / "whole", **ASKED_SINGLY)
+        sweep(scenario, out=folder / "whole", **SINGLE_OPTIONS)
         dying_at(patched, 4, Killed())
         with pytest.raises(Killed):
-            sweep(scenario, out=folder / "half", **ASKED_SINGLY)
+            sweep(scenario, out=folder / "half", **SINGLE_OPTIONS)
         patched.undo()
         patched.setenv("RUST_BACKTRACE", "0")  # to name the functions of a panic takes seconds
         yield folder

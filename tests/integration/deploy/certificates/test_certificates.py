@@ -36,7 +36,7 @@ from tests.support.deploy.certificates import (
 )
 from tests.support.deploy.gateways import DrivenRobots
 
-HERE = ("127.0.0.1",)
+ADDRESSES = ("127.0.0.1",)
 EVERYTHING = (KEYS.any_radio, KEYS.any_pose, KEYS.bridge_received("flock-0"))
 SCENARIO = Path(__file__).parents[4] / "scenarios" / "robots" / "flocking-epuck2.toml"
 FLOCK = ("flock-0", "flock-1")
@@ -72,7 +72,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A CA, and certificates of three robots and their company."""
     folder = tmp_path_factory.mktemp("lab") / "ca"
     begin_authority(folder, WallClock())
-    issue(folder, [certificate_request(name, HERE) for name in (*ROBOTS, "tracker", "operator")], 1, WallClock())
+    issue(folder, [certificate_request(name, ADDRESSES) for name in (*ROBOTS, "tracker", "operator")], 1, WallClock())
     return folder
 
 
@@ -196,7 +196,7 @@ def test_revoked_name_is_received_only_by_peers_without_its_revocation(folder: P
 def test_certificates_of_another_ca_are_refused(folder: Path, opened: ExitStack, tmp_path: Path):
     foreign = tmp_path / "foreign"
     begin_authority(foreign, WallClock())
-    issue(foreign, [certificate_request("flock-1", HERE)], 1, WallClock())
+    issue(foreign, [certificate_request("flock-1", ADDRESSES)], 1, WallClock())
     endpoint = endpoint_of(opened.enter_context(closed_after(ours(folder, "flock-0"))))
     close_session(stranger(endpoint, folder, (folder, "flock-1"), PATIENT_MS))
     refused: list[tuple[str, tuple[Path, str] | None]] = [
@@ -212,8 +212,8 @@ def test_certificates_of_another_ca_are_refused(folder: Path, opened: ExitStack,
 def test_expired_certificate_is_refused(opened: ExitStack, tmp_path: Path):
     folder, past = tmp_path / "ca", DatedFakeClock("2026-02-01T00:00:00Z")
     begin_authority(folder, past)
-    issue(folder, [certificate_request("flock-0", HERE)], 3000, past)
-    issue(folder, [certificate_request("flock-1", HERE)], 1, past)
+    issue(folder, [certificate_request("flock-0", ADDRESSES)], 3000, past)
+    issue(folder, [certificate_request("flock-1", ADDRESSES)], 1, past)
     endpoint = endpoint_of(opened.enter_context(closed_after(ours(folder, "flock-0"))))
     with pytest.raises(zenoh.ZError):
         stranger(endpoint, folder, (folder, "flock-1"), REFUSED_MS)

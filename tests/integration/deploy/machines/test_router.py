@@ -18,12 +18,11 @@ from swarmwire.deploy.runs.config import Listening
 from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from swarmwire.world.backends.runner_reports import RunnerEvent
 from tests.integration.deploy.machines.test_machines import lab
-from tests.support.deploy.joiners import HERE as LOCALHOST
-from tests.support.deploy.joiners import Joiners, Watcher
+from tests.support.deploy.joiners import LOCALHOST, Joiners, Watcher
 from tests.support.deploy.machines import Started, on
 from tests.support.deploy.runs import LOSSY, called
 
-HERE = ("127.0.0.1",)
+ADDRESSES = ("127.0.0.1",)
 TCP = ("--listen", "tcp/127.0.0.1:0", "--connect", "tcp/127.0.0.1:1")
 TLS = ("--listen", "tls/127.0.0.1:0", "--connect", "tls/127.0.0.1:1")
 FROZEN_S = 0.5
@@ -33,7 +32,9 @@ RUNNERS = {"r1": "8", "r2": "12"}
 
 @pytest.fixture(scope="module")
 def certs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = lab(tmp_path_factory.mktemp("lab") / "ca", {"world": HERE, "gate": HERE, "gate2": HERE}, "r1", "gone")
+    folder = lab(
+        tmp_path_factory.mktemp("lab") / "ca", {"world": ADDRESSES, "gate": ADDRESSES, "gate2": ADDRESSES}, "r1", "gone"
+    )
     revoke(folder, "gone", WallClock())
     return folder
 
@@ -81,7 +82,7 @@ def test_router_with_several_certificates_needs_a_name(certs, monkeypatch, capsy
 def test_router_admits_members_of_the_register_or_of_the_options(certs, tmp_path, monkeypatch, capsys):
     admitted: list[set[str]] = []
 
-    def noted(_of: MemberCredentials, _listen: list[str], _connect: list[str], access: dict[str, Any]) -> None:
+    def noted(_member: MemberCredentials, _listen: list[str], _connect: list[str], access: dict[str, Any]) -> None:
         admitted.append({subject["id"] for subject in access["subjects"]})
 
     monkeypatch.setattr("swarmwire.deploy.cli.router._route", noted)
@@ -200,7 +201,7 @@ class BehindGuardedRouter(Joiners):
 
 
 def test_run_goes_on_after_its_router_was_killed_and_reports_it(tmp_path):
-    certs = lab(tmp_path / "ca", {"world": HERE, "gate": HERE}, *RUNNERS)
+    certs = lab(tmp_path / "ca", {"world": ADDRESSES, "gate": ADDRESSES}, *RUNNERS)
     with ExitStack() as opened:
         joiners = BehindGuardedRouter(tmp_path, certs, opened)
         opened.callback(joiners.close)

@@ -66,7 +66,7 @@ class Join(DocumentTarget):
         self.run = small_run()
         groups = tuple(
             GroupInfo(group.name, group.agent, SHA256, len(group.rows), group.robot_names)
-            for group in self.run.whole.groups
+            for group in self.run.assignment.groups
         )
         session_info = SessionInfo("small-1", "small", SHA256, "0.1.0", 10, None, groups)
         self.terms = JoinPolicy(session_info=session_info, open=True, memory=self.run.layouts)
@@ -83,7 +83,7 @@ class Join(DocumentTarget):
 
     def feed(self, case: NamedRequest | bytes) -> None:
         runner, data = case if isinstance(case, NamedRequest) else ("one", case)
-        roster = Lockstep([self.run.whole], "wait", self.terms)
+        roster = Lockstep([self.run.assignment], "wait", self.terms)
         free = roster.missing_robots
         try:
             roster.session_info(data)
@@ -123,7 +123,7 @@ class Assignments(DocumentTarget):
         run = small_run()
         memory = AgentExecutor(run.parts[0]).memory([group.name for group in run.parts[0].groups])
         columns = {name: {column: [*cells] for column, cells in layout.items()} for name, layout in run.layouts.items()}
-        memories = ((run.parts[0], encode_memory(memory)), (run.parts[1], None), (run.whole, encode_memory({})))
+        memories = ((run.parts[0], encode_memory(memory)), (run.parts[1], None), (run.assignment, encode_memory({})))
         return [
             msgpack.packb({**part.as_mapping(), "v": frames.VERSION, "memory": one, "memory_columns": columns, **TIMES})
             for part, one in memories

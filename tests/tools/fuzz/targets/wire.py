@@ -148,7 +148,7 @@ class ProcessAnswers(ByteTarget):
 
     def make_samples(self) -> list[bytes]:
         run = small_run()
-        assignment = run.whole
+        assignment = run.assignment
         self.processes = Processes(assignment, 3, {})
         self.processes.act(TICK, run.readings, run.received, run.tx_status)
         self.honest = self.processes.answers[1:]
@@ -183,7 +183,7 @@ class RunnerFrames(FrameTarget):
         self.run = run = small_run()
         self.executor: AgentExecutor | None = None
         decoded = decode_tick(
-            frames.decode(run.frames["one"][-1]), run.whole.measures or (), readings_of(run.parts, "one")
+            frames.decode(run.frames["one"][-1]), run.assignment.measures or (), readings_of(run.parts, "one")
         )
         self.shapes = _shapes(decoded[0])
         between = encode_packets(11, 1_150_000_000, 3, run.received, run.tx_status)

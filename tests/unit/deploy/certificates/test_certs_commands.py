@@ -121,7 +121,7 @@ def test_certs_without_the_extra_name_it(certs: Certs, monkeypatch: pytest.Monke
     assert not certs.folder.exists()
 
 
-BEYOND, HERE = ("tls/10.0.0.5:7447",), ("unixsock-stream//tmp/x", "tcp/127.0.0.1:1")
+BEYOND, LOCALHOST = ("tls/10.0.0.5:7447",), ("unixsock-stream//tmp/x", "tcp/127.0.0.1:1")
 
 
 @pytest.fixture
@@ -160,7 +160,7 @@ def test_member_without_certificates_has_no_rights_and_warns_beyond_this_machine
     insecure = member("world", insecure=True)
     assert insecure.access is None
     assert "insecure" in (insecure.warning(["tcp/0.0.0.0:7447"]) or "")
-    assert member("world").warning(HERE) is None
+    assert member("world").warning(LOCALHOST) is None
 
 
 def test_register_is_needed_by_members_that_listen_alone(certified, tmp_path):

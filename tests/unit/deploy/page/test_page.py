@@ -93,14 +93,14 @@ def test_another_token_name_or_site_gives_no_control(client, control, token, hea
     """A stranger's name may be made to lead to this machine, after which its pages are of the same origin."""
     answer = client.post(f"/{token}/do", json={"do": "stop"}, headers=headers)
     assert (answer.status_code, "another site" in answer.text) == (403, "Origin" in headers)
-    assert not control.asked
+    assert not control.orders
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
 def test_orders_from_the_page_itself_are_accepted(client, control, host):
     own = {"Host": f"{host}:{PORT}", "Origin": f"http://{host}:{PORT}"}
     assert client.post("/secret/do", json={"do": "stop"}, headers=own).status_code == 200
-    assert control.asked == [("stop", None)]
+    assert control.orders == [("stop", None)]
 
 
 def test_answer_headers_forbid_foreign_content_and_embedding(client):
@@ -128,13 +128,13 @@ def test_answer_headers_forbid_foreign_content_and_embedding(client):
 def test_orders_reach_the_run(client, control, order, call):
     answer = client.post("/secret/do", json=order)
     assert (answer.status_code, answer.json()) == (200, {"event": None})
-    assert control.asked == [call]
+    assert control.orders == [call]
 
 
 def test_event_is_passed_on_unchanged_and_answered_with_its_number(client, control):
     table = {"do": "kill", "robots": {"names": ["flock-1"]}}
     assert client.post("/secret/do", json={"do": "event", "event": table}).json() == {"event": 7}
-    assert control.asked == [("event", table)]
+    assert control.orders == [("event", table)]
 
 
 @pytest.mark.parametrize(
@@ -170,7 +170,7 @@ def test_order_of_other_json_is_refused_in_one_line_with_its_key(client, control
     assert line.startswith(key)
     assert line.isprintable()
     assert len(line) < 300
-    assert not control.asked
+    assert not control.orders
 
 
 def test_refusal_of_the_run_is_passed_on_in_its_own_line(client, control):
@@ -181,7 +181,7 @@ def test_refusal_of_the_run_is_passed_on_in_its_own_line(client, control):
 def test_order_that_is_too_long_is_refused(client, control):
     answer = client.post("/secret/do", json={"do": "event", "event": {"do": "kill", "why": "x" * 100_000}})
     assert answer.status_code == 413
-    assert not control.asked
+    assert not control.orders
 
 
 def test_status_joins_the_last_answer_of_the_run_and_what_was_seen(client, control, news):

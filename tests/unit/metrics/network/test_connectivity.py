@@ -36,7 +36,7 @@ def test_components_are_those_found_by_merging(pairs):
 
 CONNECTIVITY = "algebraic_connectivity"
 PATH = [(i, i + 1) for i in range(200)]
-KNOWN = {
+EXACT = {
     "complete": (lambda n: [(a, b) for b in range(n) for a in range(b)], lambda n: n),
     "ring": (lambda n: [(0, n - 1), *PATH[: n - 1]], lambda n: 2 * (1 - np.cos(2 * np.pi / n))),
     "path": (lambda n: PATH[: n - 1], lambda n: 2 * (1 - np.cos(np.pi / n))),
@@ -47,9 +47,9 @@ KNOWN = {
 
 @pytest.mark.parametrize("max_dense", [100, 2], ids=["dense", "sparse"])
 @pytest.mark.parametrize("nodes", [4, 10, 24, 150])
-@pytest.mark.parametrize("kind", KNOWN)
+@pytest.mark.parametrize("kind", EXACT)
 def test_connectivity_is_that_of_known_graphs(kind, nodes, max_dense):
-    made, expected = KNOWN[kind]
+    made, expected = EXACT[kind]
     assert second_eigenvalue(edges(*made(nodes)), nodes, max_dense) == pytest.approx(expected(nodes), abs=2e-9)
 
 
@@ -145,7 +145,7 @@ def test_articulation_points_of_a_large_swarm_are_those_of_networkx():
 
 NAMES = ("fragmentations", "rejoin_median", "rejoin_worst", "unrejoined")
 KINDS = (Fragmentations, RejoinMedian, RejoinWorst, Unrejoined)
-WHOLE, SPLIT = edges((0, 1)), edges()
+JOINED, SPLIT = edges((0, 1)), edges()
 
 
 def events_of(ticks, hold):
@@ -162,7 +162,7 @@ def events_of(ticks, hold):
 def seen_ticks(run, ticks):
     """Of one arena with two robots: + joined, - apart, 0 all dead; at 10 ticks per second."""
     for tick, shown in enumerate(ticks):
-        yield truth(run, tick, edges=WHOLE if shown == "+" else SPLIT, alive=np.full(2, shown != "0"))
+        yield truth(run, tick, edges=JOINED if shown == "+" else SPLIT, alive=np.full(2, shown != "0"))
 
 
 def finals(ticks, hold_s=None):

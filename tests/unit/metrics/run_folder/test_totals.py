@@ -26,15 +26,15 @@ from tests.support.metrics.recorded import links, made_up_summary, record
 from tests.support.metrics.truths import departed, static, truth, watch
 
 TOTALS = ("radio_robots", "radio_distances", "radio_links")
-OF = static(5, arenas=2)
+RUN = static(5, arenas=2)
 
 
 @pytest.fixture
 def folder(tmp_path):
     """A run folder as far as the radio goes, with its summary."""
-    truths = list(ticks(DISK, OF, 7, count=20))
-    recorded, tally = record(tmp_path, OF, truths, links=True), RadioTally()
-    watch(OF, truths, tally)
+    truths = list(ticks(DISK, RUN, 7, count=20))
+    recorded, tally = record(tmp_path, RUN, truths, links=True), RadioTally()
+    watch(RUN, truths, tally)
     summary = made_up_summary(20, arenas=2, record=recorded, **tally.end(None))
     (tmp_path / "summary.json").write_text(json.dumps(summary))
     return RunFolder(tmp_path)
@@ -48,7 +48,7 @@ def test_radio_totals_agree_with_the_summary_and_with_one_another(folder):
     assert states(folder) == dict.fromkeys(TOTALS, TableState.INTACT)
     for arena, radio in enumerate(folder.summary["radio"]):
         robots, reached = folder.radio_robots(arena), folder.radio_links(arena)
-        assert robots["robot"].to_list() == list(OF.robot_names)
+        assert robots["robot"].to_list() == list(RUN.robot_names)
         for name in ("received", "blocked", "lost"):
             assert robots[f"as_sender_{name}"].sum() == robots[f"as_receiver_{name}"].sum() == radio["fates"][name]
             assert reached.filter(pl.col("fate") == name)["packets"].sum() == radio["fates"][name]

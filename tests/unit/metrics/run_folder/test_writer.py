@@ -247,8 +247,8 @@ def refusal(file: Path) -> str | None:
     """What is said of the file; None: it can be read."""
     try:
         read_parquet(file, advice="take it away")
-    except BadInput as told:
-        return str(told)
+    except BadInput as error:
+        return str(error)
     return None
 
 

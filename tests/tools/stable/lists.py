@@ -1,6 +1,6 @@
 """The lists of what users rely on, kept beside the tests. Taking something away from one is a decision.
 
-`python -m tests.tools.stable.kept` writes them anew.
+`python -m tests.tools.stable.lists` writes them anew.
 """
 
 from collections.abc import Callable
