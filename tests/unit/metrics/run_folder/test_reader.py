@@ -176,9 +176,9 @@ def test_events_and_packets_of_a_killed_run_without_any_are_empty(tmp_path):
     record(tmp_path / "ended", run, wandering(run, 2), packets=1.0)
     for name in ("packets", "events"):
         (tmp_path / name).mkdir()
-        left, ended = getattr(RunFolder(tmp_path), name)(), getattr(RunFolder(tmp_path / "ended"), name)()
-        assert len(left) == 0
-        assert left.schema == ended.schema
+        table, ended = getattr(RunFolder(tmp_path), name)(), getattr(RunFolder(tmp_path / "ended"), name)()
+        assert len(table) == 0
+        assert table.schema == ended.schema
 
 
 def test_damaged_table_and_unknown_arena_are_named(recorded):

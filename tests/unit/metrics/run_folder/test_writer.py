@@ -123,10 +123,10 @@ def test_full_queue_in_lockstep_blocks_the_loop_and_drops_nothing(tmp_path):
 
 def refuse_after(monkeypatch, files):
     """From then on the disk is full."""
-    left = iter(range(files))
+    numbers = iter(range(files))
 
     def full(frame, path):
-        if next(left, None) is None:
+        if next(numbers, None) is None:
             raise OSError(28, "No space left on device")
         write_file(frame, path)
 
