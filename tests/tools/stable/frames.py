@@ -27,7 +27,7 @@ SERIES, EDGES, LINKS, LEDS, MOVABLE, NOTED, SWITCHED, ACTUATED, REPORTED = 43, 4
 AXES = {
     ARENAS: "arenas",
     ARENAS * ROBOTS: "robots",
-    TOLD_OF: "robots told of",
+    TOLD_OF: "robots in the frame",
     RECEIVED: "received",
     SENT: "sent",
     SENT + 1: "sent + 1",
