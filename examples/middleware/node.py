@@ -31,6 +31,7 @@ HEAD = struct.Struct("<cBBIq")  # kind, sender, receiver (ALL: each other robot)
 RECORD = struct.Struct("<qcBBIq")  # time of arrival, or again of sending, in ns, and a HEAD
 ALL = 255
 PORT = 7500
+UDP_PAUSE_S = 0.05  # between the copies of a map
 MAX_COMMANDS = 1000  # that are kept for robots that are away
 
 
@@ -77,12 +78,20 @@ class Udp:
         Thread(target=self._listen, daemon=True).start()
 
     def send(self, kind: bytes, receiver: int, message: bytes) -> None:
-        """Send it; what has no route is lost."""
-        for robot in self._team.others() if receiver == ALL else (receiver,):
+        """Send it; the copies of a map go one after the other, so that no queue overflows."""
+        receivers = self._team.others() if receiver == ALL else [receiver]
+        if kind == MAP:
+            Thread(target=self._send, args=(message, receivers, UDP_PAUSE_S), daemon=True).start()
+        else:
+            self._send(message, receivers, 0.0)
+
+    def _send(self, message: bytes, receivers: Sequence[int], pause_s: float) -> None:
+        for robot in receivers:
             try:
                 self._socket.sendto(message, socket.MSG_DONTWAIT, (self._team.addresses[robot], PORT))
-            except OSError as error:
+            except OSError as error:  # no route: lost, as on the air
                 print("not sent:", error, flush=True)
+            time.sleep(pause_s)
 
     def _listen(self) -> None:
         while True:

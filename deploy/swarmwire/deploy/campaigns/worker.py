@@ -22,6 +22,7 @@ from swarmwire.comms.base.errors import Interrupted, SwarmwireError
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy.campaigns.columns import LATE, Row, failed_row, row_of
+from swarmwire.deploy.runs.config import Recording
 from swarmwire.deploy.runs.controls import Interrupt
 from swarmwire.deploy.runs.record import provenance
 from swarmwire.deploy.runs.result import Result
@@ -155,7 +156,15 @@ def _try(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes | None
 def _run_batch(task: Task, alive: Callable[[], bool]) -> tuple[list[Row], bytes | None]:
     """Run all seeds of a task in one world; return a row for each run, and their series."""
     out = None if task.record_to is None else _temporary_folder(Path(task.record_to))
-    simulation = Simulation(task.scenario, seeds=task.seeds, overrides=task.overrides, out=out, realtime=task.realtime)
+    # In real time the viewer's recording, which takes a millisecond of each tick, would make frames late.
+    simulation = Simulation(
+        task.scenario,
+        seeds=task.seeds,
+        overrides=task.overrides,
+        out=out,
+        realtime=task.realtime,
+        record=Recording(rrd=task.realtime is None),
+    )
     simulation.watch(Alive(alive, simulation.interrupt))
     series = TickSeries(simulation.metrics)
     if task.series:

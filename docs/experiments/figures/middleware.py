@@ -1,0 +1,165 @@
+"""Middleware on a moving mesh: delivery, age of information, discovery, recovery and cost of seven ways to publish."""
+
+# pyright: basic, reportUnknownMemberType=false
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from examples.middleware.delivery import radio_use, read_logs, results
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, plain_axes
+from swarmwire.metrics.pictures.report.page import blank_figure
+
+CAMPAIGN = "middleware"
+CAMPAIGNS = (CAMPAIGN,)
+COLUMNS = ()  # `digested` chooses
+IS_PARTIAL = True  # each session adds seeds
+
+NAME, LOSS = "robots.team.program.3", "radio.loss"
+COLORS = {0.0: CURVE, 0.2: ACCENT}
+LIMIT_S = 20.0  # from the end of the split to that of a run
+PANELS = (  # column, topic, title, limits
+    ("delivery_before", "state", "states delivered, no split", (-0.03, 1.03)),
+    ("delivery_within", "state", "states delivered in a half during the split", (-0.03, 1.03)),
+    ("age_mean_s", "state", "mean age of states, s, no split", None),
+    ("discovery_p50_s", "state", "discovery, median pair, s", (-0.5, 20.0)),
+    ("recovery_p50_s", "state", "recovery after the split, median pair, s", (-0.5, LIMIT_S + 0.5)),
+    ("delivery_across", "command", "commands across the split that arrive after it", (-0.03, 1.03)),
+    ("delivery_before", "map", "maps delivered, no split", (-0.03, 1.03)),
+    ("kB_per_s", "state", "frames of all robots, kB/s, with each hop", (0.0, 500.0)),
+)
+
+
+def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
+    """Return a row per run and topic, and one with topic null for each run that failed."""
+    rows: list[dict[str, Any]] = []
+    for run in runs.iter_rows(named=True):
+        begin = {key: run[key] for key in ("run", "point", "seed", NAME, LOSS, "ended", "error")}
+        if run["ended"] == "failed":
+            rows.append(begin)
+            continue
+        path = folder / "runs" / f"run-{run['run']:06d}"
+        use = radio_use(path) | {"late": run["timing_late"]}
+        rows += [begin | row | use for row in results(read_logs(path))]
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def successes(runs: pl.DataFrame, topic: str = "state") -> pl.DataFrame:
+    """Return the rows of a topic of runs that did not fail."""
+    return runs.filter(pl.col("topic") == topic)
+
+
+def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
+    """Draw a panel per measure: a dot per seed, and a line at their median."""
+    table = runs[CAMPAIGN]
+    names, losses = table[NAME].unique(maintain_order=True).to_list(), sorted(table[LOSS].unique().to_list())
+    figure = blank_figure(7.2, 6.6)
+    for index, (column, topic, title, limits) in enumerate(PANELS):
+        row, side = divmod(index, 2)
+        axes = plain_axes(figure, (0.13 + 0.49 * side, 0.775 - 0.24 * row, 0.36, 0.17), title)
+        axes.grid(visible=False, axis="y")
+        for place_index, loss in enumerate(losses):
+            for y, name in enumerate(names):
+                is_here = (pl.col(NAME) == name) & (pl.col(LOSS) == loss)
+                values = successes(table, topic).filter(is_here)[column].to_list()
+                _draw_values(axes, y + 0.3 * (place_index - 0.5), values, COLORS[loss], limits)
+        axes.set_yticks(range(len(names)), names, fontsize=SMALL_PT)
+        axes.set_ylim(len(names) - 0.4, -0.6)
+        if limits is not None:
+            axes.set_xlim(*limits)
+        else:
+            axes.set_xscale("log")
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.xaxis.set_minor_formatter("")
+    for place_index, loss in enumerate(losses):
+        figure.text(
+            0.4 + 0.15 * place_index, 0.985, f"● loss {loss:g}", color=COLORS[loss], fontsize=SMALL_PT, va="top"
+        )
+    return figure
+
+
+def _draw_values(
+    axes: Any, y: float, values: list[float | None], color: Any, limits: tuple[float, float] | None
+) -> None:
+    """Draw a dot for each value, a hollow one at the limit for each that is missing, and a line at the median."""
+    known_values = [value for value in values if value is not None]
+    axes.plot(known_values, [y] * len(known_values), "o", ms=2.6, color=color, alpha=0.7, mew=0)
+    if limits is not None:
+        missing = len(values) - len(known_values)
+        axes.plot([limits[1]] * missing, [y] * missing, "o", ms=2.8, mfc="none", mec=color, mew=0.6, clip_on=False)
+    median = _median(pl.Series(values, dtype=pl.Float64))
+    if np.isfinite(median):
+        axes.plot([median] * 2, [y - 0.14, y + 0.14], color=color, lw=1.4)
+
+
+def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
+    """Return a table of the steady time, one of discovery and the split, and one of cost; medians over seeds."""
+    table = runs[CAMPAIGN]
+    failed = table.filter(pl.col("ended") == "failed")
+    counted = successes(table)
+    is_late, late_percent = failed["error"].cast(pl.String).str.starts_with("late"), 100.0 * counted["late"].to_numpy()
+    lines = [
+        f"{len(counted)} runs count, {_seeds(counted)} seeds of each point. {len(failed)} failed, "
+        f"{is_late.sum()} of them since they were late. Of the frames of the runs that count, "
+        f"{np.median(late_percent):.2f} % were late (median), and {late_percent.max():.2f} % at most."
+    ]
+    steady = {
+        "states": ("state", "delivery_before", ".3f"),
+        "maps": ("map", "delivery_before", ".3f"),
+        "commands": ("command", "delivery_before", ".3f"),
+        "latency p50, ms": ("state", "latency_p50_ms", ".1f"),
+        "p95": ("state", "latency_p95_ms", ".0f"),
+        "p99": ("state", "latency_p99_ms", ".0f"),
+        "age, s": ("state", "age_mean_s", ".3f"),
+        "age p95, s": ("state", "age_p95_s", ".2f"),
+        "age of map, s": ("map", "age_mean_s", ".2f"),
+    }
+    split = {
+        "discovery p50, s": ("state", "discovery_p50_s", ".1f"),
+        "last pair, s": ("state", "discovery_max_s", ".1f"),
+        "states within a half": ("state", "delivery_within", ".3f"),
+        "recovery p50, s": ("state", "recovery_p50_s", ".1f"),
+        "last cut pair, s": ("state", "recovery_max_s", ".1f"),
+        "commands across": ("command", "delivery_across", ".2f"),
+        "states after": ("state", "delivery_after", ".3f"),
+        "commands after": ("command", "delivery_after", ".2f"),
+    }
+    cost = {
+        "frames/s": ("state", "frames_per_s", ".0f"),
+        "kB/s": ("state", "kB_per_s", ".0f"),
+        "airtime": ("state", "airtime", ".3f"),
+    }
+    titles = "Before the split (10 to 20 s)", "Discovery, and the split (20 to 40 s)", "Cost, over the whole run"
+    for title, columns in zip(titles, (steady, split, cost), strict=True):
+        lines.append(
+            f"{title}; medians over seeds, – where half of the runs have no value:\n\n{_table(table, columns)}"
+        )
+    return "\n\n".join(lines)
+
+
+def _table(table: pl.DataFrame, columns: Mapping[str, tuple[str, str, str]]) -> str:
+    rows = [["middleware", "loss", "seeds", *columns], ["---"] * (3 + len(columns))]
+    for (name, loss), group in successes(table).group_by(NAME, LOSS, maintain_order=True):
+        point = table.filter((pl.col(NAME) == name) & (pl.col(LOSS) == loss))
+        cells = [_cell(successes(point, topic)[column], form) for topic, column, form in columns.values()]
+        rows.append([str(name), f"{loss:g}", str(len(group)), *cells])
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def _cell(values: pl.Series, form: str) -> str:
+    median = _median(values)
+    return format(median, form) if np.isfinite(median) else "–"
+
+
+def _median(values: pl.Series) -> float:
+    """Return the median, a missing value being later than any other; NaN without values."""
+    return float(np.median(values.fill_null(np.inf).to_numpy())) if len(values) else np.nan
+
+
+def _seeds(counted: pl.DataFrame) -> str:
+    counts = counted.group_by(NAME, LOSS).len()["len"]
+    low, high = counts.min(), counts.max()
+    return f"{low}" if low == high else f"{low} to {high}"

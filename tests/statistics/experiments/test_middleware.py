@@ -1,0 +1,42 @@
+"""The numbers of the experiment on middleware."""
+
+import polars as pl
+
+from docs.experiments.experiment import LAYOUT, find_experiment
+
+BEGIN = {"run": 0, "point": 0, "robots.team.program.3": "udp", "radio.loss": 0.0, "ended": "duration", "error": None}
+STATE = {
+    "topic": "state",
+    "latency_p50_ms": 4.0,
+    "latency_p95_ms": 40.0,
+    "latency_p99_ms": 80.0,
+    "age_mean_s": 0.1,
+    "age_p95_s": 0.2,
+    "discovery_p50_s": 1.0,
+    "discovery_max_s": 2.0,
+    "recovery_max_s": None,
+    "delivery_before": 0.5,
+    "delivery_within": 1.0,
+    "delivery_across": 0.0,
+    "delivery_after": 0.9,
+    "frames_per_s": 800.0,
+    "kB_per_s": 300.0,
+    "airtime": 0.1,
+    "late": 0.004,
+}
+
+
+def numbers_of(rows):
+    return find_experiment("middleware", LAYOUT).numbers({"middleware": pl.DataFrame(rows, infer_schema_length=None)})
+
+
+def test_numbers_are_medians_over_seeds_where_a_missing_time_is_later_than_any_other():
+    seeds = [
+        BEGIN | STATE | {"seed": seed, "recovery_p50_s": recovery_s}
+        for seed, recovery_s in enumerate([3.0, None, 7.0])
+    ]
+    failed = BEGIN | {"seed": 4, "ended": "failed", "error": "late: 2.0% of its frames"}
+    text = numbers_of([*seeds, failed])
+    assert "3 runs count, 3 seeds of each point. 1 failed, 1 of them since they were late." in text
+    (row,) = [line for line in text.splitlines() if line.startswith("| udp") and "7.0" in line]
+    assert row.split(" | ")[3:9] == ["1.0", "2.0", "1.000", "7.0", "–", "–"]
