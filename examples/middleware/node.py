@@ -133,7 +133,8 @@ class Dds:
         arrivals = WaitSet(self._participant)
         self._writers: dict[tuple[bytes, int], Any] = {}
         self._readers: list[tuple[Any, Any]] = []  # with the condition that keeps them in `arrivals`
-        qualities = {STATE: Qos(Policy.Reliability.BestEffort, latest), MAP: Qos(reliable, latest), COMMAND: command}
+        sensor_data = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(5))  # as in ROS 2, over all writers
+        qualities = {STATE: sensor_data, MAP: Qos(reliable, latest), COMMAND: command}
         names = [(STATE, ALL), (MAP, ALL), *((COMMAND, robot) for robot in range(1, len(team.addresses)))]
         for kind, receiver in names:
             topic = Topic(self._participant, f"{kind.decode()}{receiver}", self._types[kind])
@@ -194,12 +195,14 @@ class Zenoh:
         zenoh.init_log_from_env_or("warn")
         endpoints = [f"tcp/{address}:{PORT}" for address in team.addresses]
         listen = {"endpoints": [endpoints[team.robot]]}
-        settings: dict[str, Any] = {"scouting": {"multicast": {"enabled": mode == "peer", "interface": "radio0"}}}
+        # All robots are on one machine, and large messages would pass by its memory instead of the radio.
+        settings: dict[str, Any] = {"transport": {"shared_memory": {"enabled": False}}}
+        settings["scouting"] = {"multicast": {"enabled": mode == "peer", "interface": "radio0"}}
         if mode == "peer":
             settings |= {"mode": "peer", "listen": listen}
         elif mode == "router" or team.robot == 0:
             connect = endpoints[: team.robot] if mode == "router" else []
-            settings |= {"mode": "router", "listen": listen, "connect": {"endpoints": connect, "timeout_ms": 0}}
+            settings |= {"mode": "router", "listen": listen, "connect": {"endpoints": connect}}
         else:
             settings |= {"mode": "client", "connect": {"endpoints": endpoints[:1], "timeout_ms": -1}}
         self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from docs.experiments.experiment import LAYOUT
 from examples.middleware.delivery import radio_use, read_logs, results
+from examples.middleware.node import TRANSPORTS
 from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, plain_axes
 from swarmwire.metrics.pictures.report.page import blank_figure
 
@@ -34,17 +36,29 @@ PANELS = (  # column, topic, title, limits
 
 
 def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
-    """Return a row per run and topic, and one with topic null for each run that failed."""
+    """Return a row per run and topic, and one with topic null for each run that failed.
+
+    Runs of earlier sessions that the campaign does not have are kept.
+    """
     rows: list[dict[str, Any]] = []
     for run in runs.iter_rows(named=True):
-        begin = {key: run[key] for key in ("run", "point", "seed", NAME, LOSS, "ended", "error")}
+        begin = {key: run[key] for key in (NAME, LOSS, "seed", "ended", "error")}
         if run["ended"] == "failed":
             rows.append(begin)
             continue
         path = folder / "runs" / f"run-{run['run']:06d}"
         use = radio_use(path) | {"late": run["timing_late"]}
         rows += [begin | row | use for row in results(read_logs(path))]
-    return pl.DataFrame(rows, infer_schema_length=None)
+    return merged(pl.DataFrame(rows, infer_schema_length=None), LAYOUT.data / f"{CAMPAIGN}.parquet")
+
+
+def merged(fresh: pl.DataFrame, earlier: Path) -> pl.DataFrame:
+    """Return digested runs with those of an earlier digest that they do not replace, in the order of the programs."""
+    tables = [fresh]
+    if earlier.exists():
+        tables.append(pl.read_parquet(earlier).join(fresh, on=[NAME, LOSS, "seed"], how="anti"))
+    order = pl.col(NAME).replace_strict({name: index for index, name in enumerate(TRANSPORTS)}, return_dtype=pl.Int64)
+    return pl.concat(tables, how="diagonal_relaxed").sort(order, LOSS, "seed", "topic", nulls_last=True)
 
 
 def successes(runs: pl.DataFrame, topic: str = "state") -> pl.DataFrame:
@@ -102,8 +116,8 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     counted = successes(table)
     is_late, late_percent = failed["error"].cast(pl.String).str.starts_with("late"), 100.0 * counted["late"].to_numpy()
     lines = [
-        f"{len(counted)} runs count, {_seeds(counted)} seeds of each point. {len(failed)} failed, "
-        f"{is_late.sum()} of them since they were late. Of the frames of the runs that count, "
+        f"{len(counted)} runs count, {_seeds(counted)} seeds of each point. {len(failed)} failed,\n"
+        f"{is_late.sum()} of them since they were late. Of the frames of the runs that count,\n"
         f"{np.median(late_percent):.2f} % were late (median), and {late_percent.max():.2f} % at most."
     ]
     steady = {

@@ -32,11 +32,30 @@ def numbers_of(rows):
 
 def test_numbers_are_medians_over_seeds_where_a_missing_time_is_later_than_any_other():
     seeds = [
-        BEGIN | STATE | {"seed": seed, "recovery_p50_s": recovery_s}
-        for seed, recovery_s in enumerate([3.0, None, 7.0])
+        BEGIN | STATE | {"seed": seed, "recovery_p50_s": recovery_s} for seed, recovery_s in enumerate([3.0, None, 7.0])
     ]
     failed = BEGIN | {"seed": 4, "ended": "failed", "error": "late: 2.0% of its frames"}
     text = numbers_of([*seeds, failed])
-    assert "3 runs count, 3 seeds of each point. 1 failed, 1 of them since they were late." in text
+    assert "3 runs count, 3 seeds of each point. 1 failed, 1 of them since they were late." in text.replace("\n", " ")
     (row,) = [line for line in text.splitlines() if line.startswith("| udp") and "7.0" in line]
     assert row.split(" | ")[3:9] == ["1.0", "2.0", "1.000", "7.0", "–", "–"]
+
+
+def test_digest_keeps_seeds_of_earlier_sessions_and_replaces_its_own(tmp_path):
+    names = ["dds", "udp"]
+    earlier = pl.DataFrame(
+        [
+            BEGIN | STATE | {"robots.team.program.3": name, "seed": seed, "airtime": 1.0}
+            for name in names
+            for seed in (1, 2)
+        ]
+    )
+    earlier.write_parquet(tmp_path / "digest.parquet")
+    fresh = pl.DataFrame([BEGIN | STATE | {"robots.team.program.3": "udp", "seed": 2, "airtime": 2.0}])
+    merged = find_experiment("middleware", LAYOUT).module.merged(fresh, tmp_path / "digest.parquet")
+    assert merged.select("robots.team.program.3", "seed", "airtime").rows() == [
+        ("udp", 1, 1.0),
+        ("udp", 2, 2.0),
+        ("dds", 1, 1.0),
+        ("dds", 2, 1.0),
+    ]
