@@ -2,7 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,18 +33,11 @@ DRONES, ESB_OCTETS = 9, 32  # of polling
 BEGIN, WINDOW_BITS, OCTETS = 16, 6, 512  # of Bianchi: slots of the first window, doublings, payload
 
 
-def closed_forms() -> list[str]:
-    """Lines of Markdown: what, by which source, what it states, what we have."""
+def closed_forms(groups: Sequence[str] = ()) -> list[str]:
+    """Lines of Markdown: what, by which source, what it states, what we have; of these GROUPS, or of all."""
     lines = ["| what | source | stated | ours | verdict |", "| --- " * 5 + "|"]
-    for quantity, source, stated, simulated, limit in [
-        *_bit_errors(),
-        *_airtimes(),
-        *_aloha(),
-        *_bianchi(),
-        *_esb(),
-        _argos(),
-        *_lora(),
-    ]:
+    lines_of_groups = (line for group in groups or GROUPS for line in GROUPS[group]())
+    for quantity, source, stated, simulated, limit in lines_of_groups:
         verdict = "within" if abs(simulated / stated - 1.0) <= limit else "**miss**"
         lines.append(f"| {quantity} | {source} | {stated:.5g} | {simulated:.5g} | {verdict} |")
     return lines
@@ -213,3 +206,14 @@ def by_argos(xy_m: np.ndarray, range_m: float, radius_m: float) -> np.ndarray:
         off_m[[a, b]] = np.inf
         near[a, b] = off_m.min() > radius_m
     return near
+
+
+GROUPS: dict[str, Callable[[], Iterable[Line]]] = {
+    "bit errors": _bit_errors,
+    "airtimes": _airtimes,
+    "aloha": _aloha,
+    "bianchi": _bianchi,
+    "esb": _esb,
+    "argos": lambda: [_argos()],
+    "lora": _lora,
+}

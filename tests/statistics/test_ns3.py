@@ -16,7 +16,7 @@ import pytest
 
 from benchmarks.ns3 import __main__ as command
 from benchmarks.ns3 import comparison
-from benchmarks.ns3.closed_forms import closed_forms
+from benchmarks.ns3.closed_forms import GROUPS, closed_forms
 from benchmarks.ns3.comparison import (
     DELAY,
     LIMITS,
@@ -183,9 +183,13 @@ def test_mixed_rows_count_broadcasts_and_unicast_apart():
     }
 
 
-def test_closed_forms_are_met():
-    lines = closed_forms()
-    assert len(lines) > 12
+SLOW = (pytest.mark.slow, pytest.mark.timeout(600))
+
+
+@pytest.mark.parametrize("group", [pytest.param(group, marks=SLOW) if group == "lora" else group for group in GROUPS])
+def test_closed_forms_are_met(group: str):
+    lines = closed_forms([group])
+    assert len(lines) > 2
     assert [line for line in lines if "miss" in line] == []
 
 
