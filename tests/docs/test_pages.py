@@ -33,7 +33,7 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def in_a_shell(line: str) -> tuple[object, str]:
     """Exit code of a line and what it prints."""
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
-    done = subprocess.run(["sh", "-c", line], **pipes, check=False, timeout=100)
+    done = subprocess.run(["sh", "-c", line], **pipes, check=False, timeout=300)
     return done.returncode, done.stdout
 
 
