@@ -184,7 +184,7 @@ def _sent_between(messages: pl.DataFrame, from_s: float, until_s: float) -> pl.D
 
 
 def _delivered(messages: pl.DataFrame) -> float | None:
-    return messages["received_s"].is_not_null().mean() if len(messages) else None  # type: ignore[return-value]
+    return messages["received_s"].count() / len(messages) if len(messages) else None  # count() leaves nulls out
 
 
 def _middle(times_s: FloatArray) -> float | None:
