@@ -30,6 +30,7 @@ SETTLED_S = 10.0  # after the end of a split
 LAST_S = 2.0  # before the end of the run: what is sent later may still be under way
 AGE_STEP_S = 0.01
 MS, S = 1e6, 1e9
+STATE_PERIOD_MS = 100.0  # PERIODS_S in node.py
 
 
 @dataclass(frozen=True)
@@ -194,6 +195,17 @@ def _middle(times_s: FloatArray) -> float | None:
 
 def _finite(time_s: float) -> float | None:
     return float(time_s) if np.isfinite(time_s) else None
+
+
+def sent_late_p99_ms(run: Path) -> float:
+    """Return how late programs sent states, the 99th percentile over a run: behind their earliest one."""
+    late_ms: list[FloatArray] = []
+    for folder in (run / "programs").iterdir():
+        sent = _records(folder / "sent.bin") if folder.is_dir() else ()
+        sent_ms = np.array([record["sent_ns"] for record in sent if record["kind"] == TOPICS["state"]]) / MS
+        after_plan_ms = sent_ms - STATE_PERIOD_MS * np.arange(len(sent_ms))
+        late_ms.append(after_plan_ms - after_plan_ms.min(initial=np.inf))
+    return float(np.percentile(np.concatenate(late_ms), 99))
 
 
 def radio_use(run: Path) -> dict[str, float]:

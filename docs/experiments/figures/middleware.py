@@ -4,15 +4,16 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
+from scipy import stats
 
 from docs.experiments.experiment import LAYOUT
-from examples.middleware.delivery import radio_use, read_logs, results
+from examples.middleware.delivery import radio_use, read_logs, results, sent_late_p99_ms
 from examples.middleware.node import TRANSPORTS
-from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, plain_axes
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.pictures.report.page import blank_figure
 
 CAMPAIGN = "middleware"
@@ -21,7 +22,7 @@ COLUMNS = ()  # `digested` chooses
 IS_PARTIAL = True  # each session adds seeds
 
 NAME, LOSS = "robots.team.program.3", "radio.loss"
-COLORS = {0.0: CURVE, 0.2: ACCENT}
+COLORS = {0.0: CURVE, 0.2: ACCENT, 0.4: SOFT}
 LIMIT_S = 20.0  # from the end of the split to that of a run
 PANELS = (  # column, topic, title, limits
     ("delivery_before", "state", "states delivered, no split", (-0.03, 1.03)),
@@ -32,6 +33,19 @@ PANELS = (  # column, topic, title, limits
     ("delivery_across", "command", "commands across the split that arrive after it", (-0.03, 1.03)),
     ("delivery_before", "map", "maps delivered, no split", (-0.03, 1.03)),
     ("kB_per_s", "state", "frames of all robots, kB/s, with each hop", (0.0, 500.0)),
+)
+MEDIANS = "medians over seeds with intervals of 95 %, – where half of the runs have no value"
+AGE, MAPS = ("age of states, s", ("state", "age_mean_s", ".2f")), ("maps delivered", ("map", "delivery_before", ".2f"))
+STATES = "states delivered", ("state", "delivery_before", ".2f")
+DIFFERENCES = (  # hypothesis, first and second middleware, title, and the topic, column and format
+    ("H1", "zenoh-peer", "dds", *AGE),
+    ("H1", "zenoh-peer", "dds-wifi", *AGE),
+    ("H1", "zenoh-peer", "dds-wifi", "latency p95, ms", ("state", "latency_p95_ms", ".0f")),
+    ("H3", "dds-wifi", "dds", *STATES),
+    ("H3", "dds-wifi", "dds", *MAPS),
+    ("", "dds-wifi", "udp", *AGE),
+    ("", "zenoh-router", "zenoh-peer", *AGE),
+    ("H7", "zenoh-peer", "udp", "recovery p50, s", ("state", "recovery_p50_s", ".1f")),
 )
 
 
@@ -47,7 +61,7 @@ def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
             rows.append(begin)
             continue
         path = folder / "runs" / f"run-{run['run']:06d}"
-        use = radio_use(path) | {"late": run["timing_late"]}
+        use = radio_use(path) | {"late": run["timing_late"], "sent_late_p99_ms": sent_late_p99_ms(path)}
         rows += [begin | row | use for row in results(read_logs(path))]
     return merged(pl.DataFrame(rows, infer_schema_length=None), LAYOUT.data / f"{CAMPAIGN}.parquet")
 
@@ -59,6 +73,35 @@ def merged(fresh: pl.DataFrame, earlier: Path) -> pl.DataFrame:
         tables.append(pl.read_parquet(earlier).join(fresh, on=[NAME, LOSS, "seed"], how="anti"))
     order = pl.col(NAME).replace_strict({name: index for index, name in enumerate(TRANSPORTS)}, return_dtype=pl.Int64)
     return pl.concat(tables, how="diagonal_relaxed").sort(order, LOSS, "seed", "topic", nulls_last=True)
+
+
+class Median(NamedTuple):
+    """A median over seeds, and its interval of at least 95 % from order statistics; NaN with too few seeds."""
+
+    value: float
+    low: float
+    high: float
+
+    @classmethod
+    def from_values(cls, values: pl.Series) -> "Median":
+        """Return the median of values, a missing one being greater than any other.
+
+        The interval is from the r-th smallest to the r-th greatest value, with the greatest r for which fewer than r of
+        n fair coins show heads in at most 2.5 % of all cases (H. A. David, Order Statistics, 2.3).
+        """
+        ordered = np.sort(values.fill_null(np.inf).to_numpy().astype(np.float64))
+        count = len(ordered)
+        if not count:
+            return cls(np.nan, np.nan, np.nan)
+        rank = int(stats.binom.ppf(0.025, count, 0.5))
+        low, high = (ordered[rank - 1], ordered[count - rank]) if rank else (np.nan, np.nan)
+        middle = ordered[(count - 1) // 2], ordered[count // 2]
+        return cls(float(np.mean(middle)), float(low), float(high))
+
+    def text(self, form: str) -> str:
+        """Return value and interval, each as a dash if it is missing."""
+        value, low, high = (format(number, form) if np.isfinite(number) else "–" for number in self)
+        return value if np.isnan(self.low) else f"{value} ({low} to {high})"
 
 
 def successes(runs: pl.DataFrame, topic: str = "state") -> pl.DataFrame:
@@ -104,9 +147,9 @@ def _draw_values(
     if limits is not None:
         missing = len(values) - len(known_values)
         axes.plot([limits[1]] * missing, [y] * missing, "o", ms=2.8, mfc="none", mec=color, mew=0.6, clip_on=False)
-    median = _median(pl.Series(values, dtype=pl.Float64))
-    if np.isfinite(median):
-        axes.plot([median] * 2, [y - 0.14, y + 0.14], color=color, lw=1.4)
+    median = Median.from_values(pl.Series(values, dtype=pl.Float64))
+    if np.isfinite(median.value):
+        axes.plot([median.value] * 2, [y - 0.14, y + 0.14], color=color, lw=1.4)
 
 
 def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
@@ -121,25 +164,24 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
         f"{np.median(late_percent):.2f} % were late (median), and {late_percent.max():.2f} % at most."
     ]
     steady = {
-        "states": ("state", "delivery_before", ".3f"),
-        "maps": ("map", "delivery_before", ".3f"),
-        "commands": ("command", "delivery_before", ".3f"),
-        "latency p50, ms": ("state", "latency_p50_ms", ".1f"),
+        "states": ("state", "delivery_before", ".2f"),
+        "maps": ("map", "delivery_before", ".2f"),
+        "commands": ("command", "delivery_before", ".2f"),
+        "latency p50, ms": ("state", "latency_p50_ms", ".0f"),
         "p95": ("state", "latency_p95_ms", ".0f"),
         "p99": ("state", "latency_p99_ms", ".0f"),
-        "age, s": ("state", "age_mean_s", ".3f"),
-        "age p95, s": ("state", "age_p95_s", ".2f"),
+        "age, s": ("state", "age_mean_s", ".2f"),
         "age of map, s": ("map", "age_mean_s", ".2f"),
     }
     split = {
+        "pairs found": ("state", "reach", ".2f"),
         "discovery p50, s": ("state", "discovery_p50_s", ".1f"),
         "last pair, s": ("state", "discovery_max_s", ".1f"),
-        "states within a half": ("state", "delivery_within", ".3f"),
+        "states within a half": ("state", "delivery_within", ".2f"),
         "recovery p50, s": ("state", "recovery_p50_s", ".1f"),
         "last cut pair, s": ("state", "recovery_max_s", ".1f"),
         "commands across": ("command", "delivery_across", ".2f"),
-        "states after": ("state", "delivery_after", ".3f"),
-        "commands after": ("command", "delivery_after", ".2f"),
+        "states after": ("state", "delivery_after", ".2f"),
     }
     cost = {
         "frames/s": ("state", "frames_per_s", ".0f"),
@@ -148,29 +190,41 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     }
     titles = "Before the split (10 to 20 s)", "Discovery, and the split (20 to 40 s)", "Cost, over the whole run"
     for title, columns in zip(titles, (steady, split, cost), strict=True):
-        lines.append(
-            f"{title}; medians over seeds, – where half of the runs have no value:\n\n{_table(table, columns)}"
-        )
+        lines.append(f"{title}; {MEDIANS}:\n\n{_table(table, columns)}")
+    lines.append(f"Differences between runs with the same seed, so the same motion; {MEDIANS}:\n\n{_pairs(table)}")
     return "\n\n".join(lines)
 
 
 def _table(table: pl.DataFrame, columns: Mapping[str, tuple[str, str, str]]) -> str:
+    table = table.with_columns((pl.col("discovered") / pl.col("pairs")).alias("reach"))
     rows = [["middleware", "loss", "seeds", *columns], ["---"] * (3 + len(columns))]
     for (name, loss), group in successes(table).group_by(NAME, LOSS, maintain_order=True):
         point = table.filter((pl.col(NAME) == name) & (pl.col(LOSS) == loss))
-        cells = [_cell(successes(point, topic)[column], form) for topic, column, form in columns.values()]
+        cells = [
+            Median.from_values(successes(point, topic)[column]).text(form) for topic, column, form in columns.values()
+        ]
         rows.append([str(name), f"{loss:g}", str(len(group)), *cells])
+    return _markdown(rows)
+
+
+def _pairs(table: pl.DataFrame) -> str:
+    """Return a table of the differences that the hypotheses are about."""
+    rows = [["hypothesis", "difference", "loss", "seeds", "first is greater in", "median"], ["---"] * 6]
+    for hypothesis, first, second, title, (topic, column, form) in DIFFERENCES:
+        pairs = successes(table, topic).filter(pl.col(NAME) == first)
+        others = successes(table, topic).filter(pl.col(NAME) == second)
+        both = pairs.join(others, on=[LOSS, "seed"]).with_columns(
+            (pl.col(column) - pl.col(f"{column}_right")).alias("difference")
+        )
+        for (loss,), group in both.drop_nulls("difference").group_by(LOSS, maintain_order=True):
+            greater = str((group["difference"] > 0).sum())
+            median = Median.from_values(group["difference"]).text(form)
+            rows.append([hypothesis, f"{first} - {second}, {title}", f"{loss:g}", str(len(group)), greater, median])
+    return _markdown(rows)
+
+
+def _markdown(rows: list[list[str]]) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
-
-
-def _cell(values: pl.Series, form: str) -> str:
-    median = _median(values)
-    return format(median, form) if np.isfinite(median) else "–"
-
-
-def _median(values: pl.Series) -> float:
-    """Return the median, a missing value being later than any other; NaN without values."""
-    return float(np.median(values.fill_null(np.inf).to_numpy())) if len(values) else np.nan
 
 
 def _seeds(counted: pl.DataFrame) -> str:

@@ -4,7 +4,8 @@ import polars as pl
 
 from docs.experiments.experiment import LAYOUT, find_experiment
 
-BEGIN = {"run": 0, "point": 0, "robots.team.program.3": "udp", "radio.loss": 0.0, "ended": "duration", "error": None}
+NAME = "robots.team.program.3"
+BEGIN = {"run": 0, "point": 0, NAME: "udp", "radio.loss": 0.0, "ended": "duration", "error": None}
 STATE = {
     "topic": "state",
     "latency_p50_ms": 4.0,
@@ -12,8 +13,11 @@ STATE = {
     "latency_p99_ms": 80.0,
     "age_mean_s": 0.1,
     "age_p95_s": 0.2,
+    "pairs": 56,
+    "discovered": 28,
     "discovery_p50_s": 1.0,
     "discovery_max_s": 2.0,
+    "recovery_p50_s": None,
     "recovery_max_s": None,
     "delivery_before": 0.5,
     "delivery_within": 1.0,
@@ -38,22 +42,35 @@ def test_numbers_are_medians_over_seeds_where_a_missing_time_is_later_than_any_o
     text = numbers_of([*seeds, failed])
     assert "3 runs count, 3 seeds of each point. 1 failed, 1 of them since they were late." in text.replace("\n", " ")
     (row,) = [line for line in text.splitlines() if line.startswith("| udp") and "7.0" in line]
-    assert row.split(" | ")[3:9] == ["1.0", "2.0", "1.000", "7.0", "–", "–"]
+    assert row.split(" | ")[3:9] == ["0.50", "1.0", "2.0", "1.00", "7.0", "–"]
+
+
+def test_numbers_have_the_interval_of_a_median_from_order_statistics():
+    # Of 20 values the 6th and the 15th: 2 P(Bin(20, 1/2) < 6) = 0.0414 (H. A. David, Order Statistics, table of 2.3).
+    rows = [BEGIN | STATE | {"seed": seed, "recovery_p50_s": float(seed)} for seed in range(1, 21)]
+    assert "| 10.5 (6.0 to 15.0) |" in numbers_of(rows)
+    late = [row | ({"recovery_p50_s": None} if row["seed"] > 12 else {}) for row in rows]
+    assert "| 10.5 (6.0 to –) |" in numbers_of(late)
+
+
+def test_numbers_pair_runs_with_the_same_seed():
+    rows = [
+        BEGIN | STATE | {NAME: name, "seed": seed, "age_mean_s": 10.0 * seed + age_s}
+        for name, ages_s in (("dds", [1.0, 2.0, 3.0]), ("zenoh-peer", [1.5, 4.0, 2.0]))
+        for seed, age_s in enumerate(ages_s)
+    ]
+    assert "| H1 | zenoh-peer - dds, age of states, s | 0 | 3 | 2 | 0.50 |" in numbers_of(rows)
 
 
 def test_digest_keeps_seeds_of_earlier_sessions_and_replaces_its_own(tmp_path):
     names = ["dds", "udp"]
     earlier = pl.DataFrame(
-        [
-            BEGIN | STATE | {"robots.team.program.3": name, "seed": seed, "airtime": 1.0}
-            for name in names
-            for seed in (1, 2)
-        ]
+        [BEGIN | STATE | {NAME: name, "seed": seed, "airtime": 1.0} for name in names for seed in (1, 2)]
     )
     earlier.write_parquet(tmp_path / "digest.parquet")
-    fresh = pl.DataFrame([BEGIN | STATE | {"robots.team.program.3": "udp", "seed": 2, "airtime": 2.0}])
+    fresh = pl.DataFrame([BEGIN | STATE | {NAME: "udp", "seed": 2, "airtime": 2.0}])
     merged = find_experiment("middleware", LAYOUT).module.merged(fresh, tmp_path / "digest.parquet")
-    assert merged.select("robots.team.program.3", "seed", "airtime").rows() == [
+    assert merged.select(NAME, "seed", "airtime").rows() == [
         ("udp", 1, 1.0),
         ("udp", 2, 2.0),
         ("dds", 1, 1.0),

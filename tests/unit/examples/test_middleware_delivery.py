@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from examples.middleware import delivery, node
-from examples.middleware.delivery import ALL, RECORD, Logs, age_s, messages_of, results
+from examples.middleware.delivery import ALL, RECORD, Logs, age_s, messages_of, results, sent_late_p99_ms
 
 START_NS = 7_000_000_000
 
@@ -49,6 +49,17 @@ def test_messages_have_a_row_for_each_robot_that_they_are_for_and_their_first_ar
         ("state", 0, 1, 1.0, 1.2),
         ("state", 0, 2, 1.0, None),
     ]
+
+
+def test_sent_late_is_behind_the_earliest_state_of_each_program(tmp_path):
+    assert 1e3 * node.PERIODS_S[node.STATE] == delivery.STATE_PERIOD_MS
+    for robot, late_s in enumerate([0.0, 0.05]):
+        (folder := tmp_path / "programs" / f"team-{robot}").mkdir(parents=True)
+        sent_s = [1.0 + robot + 0.1 * k + (late_s if k == 1 else 0.0) for k in range(3)]
+        rows = [(at_s, b"s", robot, ALL, k, at_s) for k, at_s in enumerate(sent_s)]
+        (folder / "sent.bin").write_bytes(records(*rows, (9.0, b"m", robot, ALL, 9, 9.0)).tobytes())
+    (tmp_path / "programs" / "hosts").touch()
+    assert sent_late_p99_ms(tmp_path) == pytest.approx(np.percentile([0, 0, 0, 0, 50, 0], 99))
 
 
 def test_age_is_that_of_the_newest_message_also_if_older_ones_arrive_after_it():
