@@ -3,6 +3,7 @@
     python delivery.py RUN
 
 A message counts as delivered to a robot if it arrived there before the end of the run; what arrives twice counts once.
+A state or map that was due while its robot's middleware was not open, or blocked, counts as sent, and is lost.
 The age of a robot's information at time t is t less the time of sending of the newest message that it has. All clocks
 are that of one machine.
 """
@@ -25,7 +26,7 @@ RECORD = np.dtype(
     [("at_ns", "<i8"), ("kind", "S1"), ("sender", "u1"), ("receiver", "u1"), ("number", "<u4"), ("sent_ns", "<i8")]
 )
 ALL = 255
-DISCOVERY_S = 10.0  # after the start: until then programs find one another, and nothing counts
+DISCOVERY_S = 8.0  # after the middlewares' start: until then programs find one another, and nothing counts
 SETTLED_S = 10.0  # after the end of a split
 LAST_S = 2.0  # before the end of the run: what is sent later may still be under way
 AGE_STEP_S = 0.01
@@ -40,12 +41,14 @@ class Logs:
     Attributes:
         messages: a row per message and robot for which it was meant: topic, sender, receiver, sent_s, and received_s,
             null if it did not arrive; times from the start of the run.
+        begin_s: time at which the middlewares of all robots had begun.
         halves: of the split, by robot: true for those on one side of it.
         split_s: begin and end of the split.
         end_s: the end of the run.
     """
 
     messages: pl.DataFrame
+    begin_s: float
     halves: BoolArray
     split_s: tuple[float, float]
     end_s: float
@@ -94,6 +97,7 @@ def read_logs(run: Path) -> Logs:
     names: list[str] = json.loads((run / "static.json").read_text())["robot_names"]
     folders = [run / "programs" / name for name in names]
     start_ns = min(int((folder / "started").read_text()) for folder in folders)
+    begun_ns = max(int((folder / "begun").read_text()) for folder in folders)
     scenario = tomllib.loads((run / "scenario.toml").read_text())
     split, duration_s = scenario["events"][0], float(scenario["duration_s"])
     ticks = pl.read_parquet(run / "ticks.parquet", columns=["time_s", "x_m"])
@@ -101,7 +105,8 @@ def read_logs(run: Path) -> Logs:
     received = {robot: _records(folder / "received.bin") for robot, folder in enumerate(folders)}
     sent = np.concatenate([_records(folder / "sent.bin") for folder in folders])
     messages = messages_of(sent, received, start_ns)
-    return Logs(messages, x_m < 0.0, (split["at_s"], split["at_s"] + split["for_s"]), duration_s)
+    split_s = split["at_s"], split["at_s"] + split["for_s"]
+    return Logs(messages, (begun_ns - start_ns) / S, x_m < 0.0, split_s, duration_s)
 
 
 def _records(path: Path) -> np.ndarray[Any, Any]:
@@ -110,10 +115,10 @@ def _records(path: Path) -> np.ndarray[Any, Any]:
     return np.frombuffer(data[: len(data) // RECORD.itemsize * RECORD.itemsize], RECORD)
 
 
-def age_s(sent_s: FloatArray, received_s: FloatArray, times_s: FloatArray) -> FloatArray:
-    """Return the age of a receiver's information at `times_s` (t,), from messages (m,); 0 s old at time 0."""
+def age_s(sent_s: FloatArray, received_s: FloatArray, times_s: FloatArray, begin_s: float = 0.0) -> FloatArray:
+    """Return the age of a receiver's information at `times_s` (t,), from messages (m,); 0 s old at `begin_s`."""
     order = np.argsort(received_s)
-    newest_s = np.maximum.accumulate(np.concatenate([[0.0], sent_s[order]]))
+    newest_s = np.maximum.accumulate(np.concatenate([[begin_s], sent_s[order]]))
     return times_s - newest_s[np.searchsorted(received_s[order], times_s, side="right")]
 
 
@@ -129,20 +134,21 @@ def results(logs: Logs) -> Iterator[dict[str, Any]]:
 
     delivery_before, _after: of messages sent in the steady time before and after the split. delivery_within: of those
     sent during the split to robots of the same half. delivery_across: of those sent during it to the other half, which
-    arrive after it. latency and age: before the split. discovery: time from the start of the run until a pair's first
+    arrive after it. latency and age: before the split. discovery: time from the middlewares' start until a pair's first
     message. recovery: time from the end of the split until a cut pair's first message that was sent after it.
     """
     begin_s, end_s = logs.split_s
+    steady_s = logs.begin_s + DISCOVERY_S
     side = pl.DataFrame({"receiver": np.arange(len(logs.halves)), "side": logs.halves})
     all_messages = (
         logs.messages.join(side, on="receiver")
         .join(side.rename({"receiver": "sender", "side": "sender_side"}), on="sender")
         .with_columns((pl.col("side") != pl.col("sender_side")).alias("is_cut"))
     )
-    times_s = np.arange(DISCOVERY_S, begin_s, AGE_STEP_S)
+    times_s = np.arange(steady_s, begin_s, AGE_STEP_S)
     for topic in TOPICS:
         messages = all_messages.filter(pl.col("topic") == topic)
-        before = _sent_between(messages, DISCOVERY_S, begin_s)
+        before = _sent_between(messages, steady_s, begin_s)
         during = _sent_between(messages, begin_s, end_s)
         latency_ms = 1e3 * (before["received_s"] - before["sent_s"]).drop_nulls().to_numpy()
         row: dict[str, Any] = {
@@ -157,10 +163,10 @@ def results(logs: Logs) -> Iterator[dict[str, Any]]:
             row[f"latency_p{percent}_ms"] = float(np.percentile(latency_ms, percent)) if len(latency_ms) else None
         pairs = messages.select("sender", "receiver", "is_cut").unique()
         cut = messages.filter("is_cut")
-        discovery_s = times_to_first(messages, 0.0, len(pairs))
+        discovery_s = times_to_first(messages, logs.begin_s, len(pairs))
         recovery_s = times_to_first(cut, end_s, int(pairs["is_cut"].sum()))
         ages_s = [
-            age_s(pair["sent_s"].to_numpy(), pair["received_s"].to_numpy(), times_s)
+            age_s(pair["sent_s"].to_numpy(), pair["received_s"].to_numpy(), times_s, logs.begin_s)
             for (_, pair) in messages.group_by("sender", "receiver")
             for pair in (pair.drop_nulls("received_s"),)
         ]

@@ -5,7 +5,8 @@
 Each robot sends a state of 200 bytes at 10 Hz to all, and the last robot a map of 20 kB each second to all. Robot 0
 sends a command to one robot after the other, two a second, which must arrive: each middleware keeps it as well as it
 can without a database. `$ROBOT_SCRATCH/sent.bin` has a RECORD for each message that was sent, `received.bin` for each
-that arrived: `delivery.py` reads them.
+that arrived: `delivery.py` reads them. The middleware begins START_S after mesh.sh, when its modules are imported and
+babeld has routes; the file `begun` has that time.
 """
 
 # What cyclonedds and paho declare is incomplete.
@@ -19,6 +20,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
 from threading import Lock, Thread
 from types import new_class
@@ -30,6 +32,7 @@ PERIODS_S = {STATE: 0.1, MAP: 1.0, COMMAND: 0.5}
 HEAD = struct.Struct("<cBBIq")  # kind, sender, receiver (ALL: each other robot), number, time of sending in ns
 RECORD = struct.Struct("<qcBBIq")  # time of arrival, or again of sending, in ns, and a HEAD
 ALL = 255
+START_S = float(os.environ.get("START_S", "12"))  # from the start of mesh.sh to that of the middleware
 PORT = 7500
 UDP_PAUSE_S = 0.05  # between the copies of a map
 MAX_COMMANDS = 1000  # that are kept for robots that are away
@@ -268,6 +271,11 @@ class Mqtt:
             self._client.publish("team/state" if kind == STATE else "team/map", message)
 
 
+MODULES = {  # that take long to import, by the begin of a transport's name
+    "dds": ("cyclonedds.core", "cyclonedds.domain", "cyclonedds.pub", "cyclonedds.sub", "cyclonedds.idl"),
+    "zenoh": ("zenoh", "zenoh.ext"),
+    "mqtt": ("paho.mqtt.client",),
+}
 TRANSPORTS: dict[str, Callable[[Team], Transport]] = {
     "udp": Udp,
     "dds": lambda team: Dds(team, wifi=False),
@@ -308,16 +316,24 @@ def main(arguments: Sequence[str]) -> None:
     scratch, robot = Path(os.environ["ROBOT_SCRATCH"]), int(os.environ["ROBOT_INDEX"])
     addresses = team_addresses(Path("/etc/hosts").read_text(), os.environ["ROBOT"])
     received, sent = Log(scratch / "received.bin"), Log(scratch / "sent.bin")
+    for module in MODULES.get(arguments[0].partition("-")[0], ()):
+        import_module(module)
+    begin_ns = int((scratch / "started").read_text()) + int(START_S * 1e9)
+    time.sleep(max(0.0, (begin_ns - time.time_ns()) / 1e9))
+    (scratch / "begun").write_text(str(time.time_ns()))
     transport = TRANSPORTS[arguments[0]](
         Team(robot, addresses, lambda message: received.add(time.time_ns(), message), scratch)
     )
-    start_s = time.monotonic()
     for number, (at_s, kind, receiver) in enumerate(schedule(robot, len(addresses))):
-        time.sleep(max(0.0, start_s + at_s - time.monotonic()))
+        due_ns = begin_ns + int(at_s * 1e9)
+        time.sleep(max(0.0, (due_ns - time.time_ns()) / 1e9))
         now_ns = time.time_ns()
-        message = HEAD.pack(kind, robot, receiver, number, now_ns).ljust(SIZES_BYTES[kind], b"\0")
-        sent.add(now_ns, message)
-        transport.send(kind, receiver, message)
+        # The middleware was not open, or blocked: a robot sends its latest state, not those that it could not send.
+        is_stale = kind != COMMAND and now_ns > due_ns + PERIODS_S[kind] * 1e9
+        message = HEAD.pack(kind, robot, receiver, number, due_ns if is_stale else now_ns)
+        sent.add(due_ns if is_stale else now_ns, message)
+        if not is_stale:
+            transport.send(kind, receiver, message.ljust(SIZES_BYTES[kind], b"\0"))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from scipy import stats
 
 from docs.experiments.experiment import LAYOUT
 from examples.middleware.delivery import radio_use, read_logs, results, sent_late_p99_ms
-from examples.middleware.node import TRANSPORTS
+from examples.middleware.node import START_S, TRANSPORTS
 from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.pictures.report.page import blank_figure
 
@@ -22,6 +22,7 @@ COLUMNS = ()  # `digested` chooses
 IS_PARTIAL = True  # each session adds seeds
 
 NAME, LOSS = "robots.team.program.3", "radio.loss"
+MAX_BEGIN_S = START_S + 1.0  # a run whose programs begin later does not count
 COLORS = {0.0: CURVE, 0.2: ACCENT, 0.4: SOFT}
 LIMIT_S = 20.0  # from the end of the split to that of a run
 PANELS = (  # column, topic, title, limits
@@ -61,8 +62,13 @@ def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
             rows.append(begin)
             continue
         path = folder / "runs" / f"run-{run['run']:06d}"
+        logs = read_logs(path)
+        if logs.begin_s > MAX_BEGIN_S:
+            begin |= {"ended": "failed", "error": f"late: the programs began {logs.begin_s:.1f} s after the start"}
+            rows.append(begin)
+            continue
         use = radio_use(path) | {"late": run["timing_late"], "sent_late_p99_ms": sent_late_p99_ms(path)}
-        rows += [begin | row | use for row in results(read_logs(path))]
+        rows += [begin | row | use for row in results(logs)]
     return merged(pl.DataFrame(rows, infer_schema_length=None), LAYOUT.data / f"{CAMPAIGN}.parquet")
 
 

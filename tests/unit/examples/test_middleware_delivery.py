@@ -22,7 +22,7 @@ def records(*rows):
 def logs(*messages, halves=(True, False), split_s=(20.0, 40.0), end_s=60.0):
     """Logs of messages (topic, sender, receiver, sent_s, received_s)."""
     names = ("topic", "sender", "receiver", "sent_s", "received_s")
-    return Logs(pl.DataFrame(list(messages), schema=list(names), orient="row"), np.array(halves), split_s, end_s)
+    return Logs(pl.DataFrame(list(messages), schema=list(names), orient="row"), 0.0, np.array(halves), split_s, end_s)
 
 
 def of_topic(topic, result):
@@ -67,6 +67,7 @@ def test_age_is_that_of_the_newest_message_also_if_older_ones_arrive_after_it():
     ages_s = age_s(sent_s, received_s, np.array([1.0, 1.5, 3.0, 3.5, 4.0]))
     assert ages_s.tolist() == [1.0, 0.5, 2.0, 0.5, 1.0]
     assert age_s(np.empty(0), np.empty(0), np.array([4.0])).tolist() == [4.0]
+    assert age_s(np.empty(0), np.empty(0), np.array([4.0]), begin_s=1.0).tolist() == [3.0]
 
 
 def test_delivery_counts_by_phase_and_by_half():

@@ -12,10 +12,10 @@ from tests.support.deploy.runs import ROOT, swarmwire
 pytestmark = [needs_interfaces, needs_program("babeld")]
 PACKAGES = {"dds": "cyclonedds", "dds-wifi": "cyclonedds", "mqtt": "paho"}
 SHORT = {
-    "duration_s": "14",
+    "duration_s": "17",
     "robots.team.count": "3",
     "robots.team.place": '{ how = "box", size_m = [8.0, 8.0], at = [15.0, 0.0] }',
-    "events.0.at_s": "12",
+    "events.0.at_s": "14",
     "events.0.for_s": "1",
 }
 
@@ -27,6 +27,7 @@ def test_robots_receive_state_map_and_commands(tmp_path, monkeypatch, name):
     if name in PACKAGES:
         pytest.importorskip(PACKAGES[name], reason="needs the group middleware")
     monkeypatch.setenv("PYTHON", sys.executable)
+    monkeypatch.setenv("START_S", "4")
     options = [f"--set={path}={value}" for path, value in {**SHORT, "robots.team.program.3": name}.items()]
     scenario = ROOT / "examples" / "middleware" / "two-rooms.toml"
     done = swarmwire("run", scenario, "--realtime", "1", "--no-rrd", "--quiet", "--out", tmp_path / "run", *options)
