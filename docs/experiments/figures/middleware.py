@@ -116,7 +116,7 @@ def successes(runs: pl.DataFrame, topic: str = "state") -> pl.DataFrame:
 
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
-    """Draw a panel per measure: a dot per seed, and a line at their median."""
+    """Draw a panel per measure: a dot per seed, and their median with its interval."""
     table = runs[CAMPAIGN]
     names, losses = table[NAME].unique(maintain_order=True).to_list(), sorted(table[LOSS].unique().to_list())
     figure = blank_figure(7.2, 6.6)
@@ -147,13 +147,15 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
 def _draw_values(
     axes: Any, y: float, values: list[float | None], color: Any, limits: tuple[float, float] | None
 ) -> None:
-    """Draw a dot for each value, a hollow one at the limit for each that is missing, and a line at the median."""
+    """Draw a dot for each value, a hollow one at the limit if it is missing, and the median with its interval."""
     known_values = [value for value in values if value is not None]
     axes.plot(known_values, [y] * len(known_values), "o", ms=2.6, color=color, alpha=0.7, mew=0)
-    if limits is not None:
-        missing = len(values) - len(known_values)
-        axes.plot([limits[1]] * missing, [y] * missing, "o", ms=2.8, mfc="none", mec=color, mew=0.6, clip_on=False)
+    last = limits[1] if limits else max(known_values, default=0.0)
+    missing = len(values) - len(known_values)
+    axes.plot([last] * missing, [y] * missing, "o", ms=2.8, mfc="none", mec=color, mew=0.6, clip_on=False)
     median = Median.from_values(pl.Series(values, dtype=pl.Float64))
+    if np.isfinite(median.low):
+        axes.plot([median.low, min(median.high, last)], [y, y], color=color, lw=0.8)
     if np.isfinite(median.value):
         axes.plot([median.value] * 2, [y - 0.14, y + 0.14], color=color, lw=1.4)
 
@@ -194,7 +196,7 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
         "kB/s": ("state", "kB_per_s", ".0f"),
         "airtime": ("state", "airtime", ".3f"),
     }
-    titles = "Before the split (10 to 20 s)", "Discovery, and the split (20 to 40 s)", "Cost, over the whole run"
+    titles = "Before the split (20 to 30 s)", "Discovery, and the split (30 to 50 s)", "Cost, over the whole run"
     for title, columns in zip(titles, (steady, split, cost), strict=True):
         lines.append(f"{title}; {MEDIANS}:\n\n{_table(table, columns)}")
     lines.append(f"Differences between runs with the same seed, so the same motion; {MEDIANS}:\n\n{_pairs(table)}")
