@@ -31,6 +31,7 @@ SETTLED_S = 10.0  # after the end of a split
 LAST_S = 2.0  # before the end of the run: what is sent later may still be under way
 AGE_STEP_S = 0.01
 MS, S = 1e6, 1e9
+FATES = ("out_of_range", "lost", "collided")  # of frames, beside those that were received or cut off by the split
 STATE_PERIOD_MS = 100.0  # PERIODS_S in node.py
 
 
@@ -215,14 +216,18 @@ def sent_late_p99_ms(run: Path) -> float:
 
 
 def radio_use(run: Path) -> dict[str, float]:
-    """Return the radio's use over a run: frames and kB that programs sent each second, and the share of airtime."""
+    """Return frames and kB that programs sent each second, airtime, and the shares of FATES among all receivers.
+
+    A receiver is each robot for which a frame was meant, on each hop: all others for a broadcast.
+    """
     summary = json.loads((run / "summary.json").read_text())
     robots, sim_time_s = pl.read_parquet(run / "radio_robots.parquet"), summary["sim_time_s"]
-    sent = summary["interfaces"]
+    sent, radio = summary["interfaces"], summary["radio"]
     return {
         "frames_per_s": sent["sent"] / sim_time_s,
         "kB_per_s": sent["sent_bytes"] / sim_time_s / 1e3,
         "airtime": float(robots["airtime_s"].sum()) / sim_time_s,
+        **{f"{fate}_share": radio["fates"][fate] / radio["intended"] for fate in FATES},
     }
 
 

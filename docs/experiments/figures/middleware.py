@@ -195,8 +195,15 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
         "frames/s": ("state", "frames_per_s", ".0f"),
         "kB/s": ("state", "kB_per_s", ".0f"),
         "airtime": ("state", "airtime", ".3f"),
+        "out of range": ("state", "out_of_range_share", ".3f"),
+        "lost": ("state", "lost_share", ".3f"),
+        "collided": ("state", "collided_share", ".3f"),
     }
-    titles = "Before the split (20 to 30 s)", "Discovery, and the split (30 to 50 s)", "Cost, over the whole run"
+    titles = (
+        "Before the split (20 to 30 s)",
+        "Discovery, and the split (30 to 50 s)",
+        "Cost over the whole run, and shares of frames' receivers by fate",
+    )
     for title, columns in zip(titles, (steady, split, cost), strict=True):
         lines.append(f"{title}; {MEDIANS}:\n\n{_table(table, columns)}")
     lines.append(f"Differences between runs with the same seed, so the same motion; {MEDIANS}:\n\n{_pairs(table)}")

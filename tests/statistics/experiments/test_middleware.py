@@ -26,6 +26,9 @@ STATE = {
     "frames_per_s": 800.0,
     "kB_per_s": 300.0,
     "airtime": 0.1,
+    "out_of_range_share": 0.1,
+    "lost_share": 0.0,
+    "collided_share": 0.01,
     "late": 0.004,
 }
 
