@@ -5,7 +5,6 @@ COLUMNS = ("order.mean",)            responses that the digests keep
 def draw(runs): ...                  from digests by campaign to a matplotlib figure
 def numbers(runs): ...               to Markdown: tables of the numbers that the page cites
 def digested(folder, runs): ...      where a choice of columns is not enough: from a campaign's folder and table
-IS_PARTIAL = True                    where campaigns that are not over are digested, too
 """
 
 from collections.abc import Mapping
@@ -63,11 +62,6 @@ class Experiment:
     campaigns: tuple[str, ...]
     columns: tuple[str, ...]
     module: Any
-
-    @property
-    def is_partial(self) -> bool:
-        """Whether its campaigns are digested before they are over."""
-        return bool(getattr(self.module, "IS_PARTIAL", False))
 
     def draw(self, runs: Mapping[str, pl.DataFrame]) -> Any:
         """The matplotlib figure."""

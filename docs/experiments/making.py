@@ -59,9 +59,9 @@ def digest(experiment: Experiment, layout: Layout, folders: Sequence[Path] = ())
 
 
 def digest_of(experiment: Experiment, folder: Path) -> pl.DataFrame:
-    """The digest of one campaign; BadInput unless it is over, or partial, and has the columns that are wanted."""
+    """The digest of one campaign; BadInput unless it is over and has the columns that are wanted."""
     campaign = CampaignFolder(folder)
-    if not campaign.finished and not experiment.is_partial:
+    if not campaign.finished:
         lacking = f"{len(campaign.missing)} of {campaign.about.runs} runs are missing"
         raise BadInput(
             str(folder), "", f"expected a campaign that is over; {lacking}: swarmwire sweep --resume {folder}"

@@ -10,7 +10,6 @@ import numpy as np
 import polars as pl
 from scipy import stats
 
-from docs.experiments.experiment import LAYOUT
 from examples.middleware.delivery import radio_use, read_logs, results, sent_late_p99_ms
 from examples.middleware.node import START_S, TRANSPORTS
 from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
@@ -19,7 +18,6 @@ from swarmwire.metrics.pictures.report.page import blank_figure
 CAMPAIGN = "middleware"
 CAMPAIGNS = (CAMPAIGN,)
 COLUMNS = ()  # `digested` chooses
-IS_PARTIAL = True  # each session adds seeds
 
 NAME, LOSS = "robots.team.program.3", "radio.loss"
 MAX_BEGIN_S = START_S + 1.0  # a run whose programs begin later does not count
@@ -51,10 +49,7 @@ DIFFERENCES = (  # hypothesis, first and second middleware, title, and the topic
 
 
 def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
-    """Return a row per run and topic, and one with topic null for each run that failed.
-
-    Runs of earlier sessions that the campaign does not have are kept.
-    """
+    """Return a row per run and topic, and one with topic null for each run that failed, in the order of programs."""
     rows: list[dict[str, Any]] = []
     for run in runs.iter_rows(named=True):
         begin = {key: run[key] for key in (NAME, LOSS, "seed", "ended", "error")}
@@ -69,16 +64,8 @@ def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
             continue
         use = radio_use(path) | {"late": run["timing_late"], "sent_late_p99_ms": sent_late_p99_ms(path)}
         rows += [begin | row | use for row in results(logs)]
-    return merged(pl.DataFrame(rows, infer_schema_length=None), LAYOUT.data / f"{CAMPAIGN}.parquet")
-
-
-def merged(fresh: pl.DataFrame, earlier: Path) -> pl.DataFrame:
-    """Return digested runs with those of an earlier digest that they do not replace, in the order of the programs."""
-    tables = [fresh]
-    if earlier.exists():
-        tables.append(pl.read_parquet(earlier).join(fresh, on=[NAME, LOSS, "seed"], how="anti"))
     order = pl.col(NAME).replace_strict({name: index for index, name in enumerate(TRANSPORTS)}, return_dtype=pl.Int64)
-    return pl.concat(tables, how="diagonal_relaxed").sort(order, LOSS, "seed", "topic", nulls_last=True)
+    return pl.DataFrame(rows, infer_schema_length=None).sort(order, LOSS, "seed", "topic", nulls_last=True)
 
 
 class Median(NamedTuple):

@@ -63,19 +63,3 @@ def test_numbers_pair_runs_with_the_same_seed():
         for seed, age_s in enumerate(ages_s)
     ]
     assert "| H1 | zenoh-peer - dds, age of states, s | 0 | 3 | 2 | 0.50 |" in numbers_of(rows)
-
-
-def test_digest_keeps_seeds_of_earlier_sessions_and_replaces_its_own(tmp_path):
-    names = ["dds", "udp"]
-    earlier = pl.DataFrame(
-        [BEGIN | STATE | {NAME: name, "seed": seed, "airtime": 1.0} for name in names for seed in (1, 2)]
-    )
-    earlier.write_parquet(tmp_path / "digest.parquet")
-    fresh = pl.DataFrame([BEGIN | STATE | {NAME: "udp", "seed": 2, "airtime": 2.0}])
-    merged = find_experiment("middleware", LAYOUT).module.merged(fresh, tmp_path / "digest.parquet")
-    assert merged.select(NAME, "seed", "airtime").rows() == [
-        ("udp", 1, 1.0),
-        ("udp", 2, 2.0),
-        ("dds", 1, 1.0),
-        ("dds", 2, 1.0),
-    ]
