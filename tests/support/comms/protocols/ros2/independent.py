@@ -3,10 +3,21 @@
 Each is written out as its .msg file is, what they have in common, too: to be held against that line by line.
 """
 
+import sys
 from dataclasses import dataclass, field
 
 from pycdr2 import IdlStruct
 from pycdr2.types import array, float32, float64, int16, int32, sequence, uint8, uint32
+
+if sys.version_info >= (3, 14):  # annotations are evaluated when they are read; pycdr2's empty dict would hide them
+    PREPARE = type(IdlStruct).__prepare__
+
+    def _prepare(_, name, bases, **keywords):
+        namespace = PREPARE(name, bases, **keywords)
+        del namespace["__annotations__"]
+        return namespace
+
+    type(IdlStruct).__prepare__ = classmethod(_prepare)
 
 
 @dataclass
