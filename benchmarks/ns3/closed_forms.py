@@ -60,8 +60,8 @@ def _bit_errors() -> Iterator[Line]:
 
 def _airtimes() -> Iterator[Line]:
     source = "ns-3's test of durations"
-    yield "802.11b, 1023 octets at 11M, µs", source, 936, _us(ieee80211b_ns(1023, 11_000_000, short_preamble=False)), 0
-    yield "802.11b, 1024 octets at 1M, µs", source, 8384, _us(ieee80211b_ns(1024, 1_000_000, short_preamble=False)), 0
+    yield "802.11b, 1023 octets at 11M, µs", source, 936, _us(ieee80211b_ns(1023, 11_000_000)), 0
+    yield "802.11b, 1024 octets at 1M, µs", source, 8384, _us(ieee80211b_ns(1024, 1_000_000)), 0
     yield "802.11a, 1536 octets at 54M, µs", source, 248, _us(ieee80211a_ns(1536, 54_000_000)), 0
     yield "802.11g, 1536 octets at 54M, µs", source, 254, _us(ieee80211g_ns(1536, 54_000_000)), 0
 

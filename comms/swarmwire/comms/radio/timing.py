@@ -51,12 +51,12 @@ def at_bit_rate_ns(octets: Octets, bit_rate_bps: int) -> Octets:
     return -(-octets * 8 * NS_PER_S // bit_rate_bps)
 
 
-def ieee80211b_ns(psdu_octets: Octets, rate_bps: int, *, short_preamble: bool) -> Octets:
-    """Return the airtime of IEEE 802.11b: 192 us (short preamble 96) + 8 x PSDU / rate, rounded up to us (18.2.3.5).
+def ieee80211b_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
+    """Return the airtime of IEEE 802.11b: 192 us (long preamble) + 8 x PSDU / rate, rounded up to us (18.2.3.5).
 
-    The PSDU holds MAC header (24 octets), frame body and FCS (4). There is no short preamble at 1 Mbit/s.
+    The PSDU holds MAC header (24 octets), frame body and FCS (4).
     """
-    return (96 if short_preamble else 192) * US - (-psdu_octets * 8_000_000 // rate_bps) * US
+    return 192 * US - (-psdu_octets * 8_000_000 // rate_bps) * US
 
 
 def ieee80211a_ns(psdu_octets: Octets, rate_bps: int) -> Octets:
@@ -185,15 +185,6 @@ class Esb:
     def irq_ns(self, rate_bps: int) -> int:
         """Return T_IRQ, the delay of the interrupt; the specification has none for 250 kbit/s: as for 1 Mbit/s."""
         return 6 * US if rate_bps == ESB_RATES_BPS[-1] else 8_200
-
-    def exchange_ns(self, payload_octets: int, answer_octets: int, frame_octets: int, rate_bps: int) -> int:
-        """Return T_ESB = T_UL + 2 Tstby2a + T_OA + T_ACK + T_IRQ: a poll and its answer, both with a payload.
-
-        `frame_octets` are those of a frame without payload.
-        """
-        on_air_ns = self.airtime_ns(frame_octets + payload_octets, rate_bps)
-        on_air_ns += self.airtime_ns(frame_octets + answer_octets, rate_bps)
-        return self.upload_ns * payload_octets + 2 * self.turnaround_ns + on_air_ns + self.irq_ns(rate_bps)
 
 
 ESB = Esb()

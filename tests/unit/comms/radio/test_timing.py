@@ -133,21 +133,19 @@ def test_airtime_of_802_15_4_matches_the_standard(psdu_octets: int, stated_us: i
 
 
 @pytest.mark.parametrize(
-    ("octets", "rate_bps", "short_preamble", "stated_us"),
+    ("octets", "rate_bps", "stated_us"),
     [
-        *((1023 + i, 11_000_000, False, 936 + i) for i in range(4)),
-        *((1023 + i, 11_000_000, True, 840 + i) for i in range(4)),
-        *((1023 + i, 5_500_000, True, us) for i, us in enumerate((1584, 1586, 1587, 1589))),
-        *((1023 + i, 2_000_000, False, us) for i, us in enumerate((4284, 4288, 4292, 4296))),
-        *((1023 + i, 1_000_000, False, us) for i, us in enumerate((8376, 8384, 8392, 8400))),
-        (14, 1_000_000, False, 304),
-        (1536, 11_000_000, False, 1310),
-        (76, 11_000_000, False, 248),
-        (14, 11_000_000, False, 203),
+        *((1023 + i, 11_000_000, 936 + i) for i in range(4)),
+        *((1023 + i, 2_000_000, us) for i, us in enumerate((4284, 4288, 4292, 4296))),
+        *((1023 + i, 1_000_000, us) for i, us in enumerate((8376, 8384, 8392, 8400))),
+        (14, 1_000_000, 304),
+        (1536, 11_000_000, 1310),
+        (76, 11_000_000, 248),
+        (14, 11_000_000, 203),
     ],
 )
-def test_airtime_of_802_11b_matches_ns3(octets: int, rate_bps: int, short_preamble: bool, stated_us: int):
-    assert ieee80211b_ns(octets, rate_bps, short_preamble=short_preamble) == stated_us * US
+def test_airtime_of_802_11b_matches_ns3(octets: int, rate_bps: int, stated_us: int):
+    assert ieee80211b_ns(octets, rate_bps) == stated_us * US
 
 
 @pytest.mark.parametrize(("octets", "a_us", "g_us"), [(1536, 248, 254), (76, 32, 38), (14, 24, 30)])
@@ -173,7 +171,7 @@ def test_bits_per_symbol_of_802_11n_are_those_of_52_subcarriers():
 def test_airtime_of_a_hundred_octets_over_udp_matches_the_source():
     """Headers: MAC 24, FCS 4, LLC 8, IP and UDP 28; then DIFS and the mean backoff of a broadcast."""
     octets = 100 + 24 + 4 + 8 + 28
-    b_ns, a_ns = ieee80211b_ns(octets, 1_000_000, short_preamble=False), ieee80211a_ns(octets, 6_000_000)
+    b_ns, a_ns = ieee80211b_ns(octets, 1_000_000), ieee80211a_ns(octets, 6_000_000)
     assert (b_ns, a_ns, ieee80211g_ns(octets, 6_000_000)) == (1504 * US, 244 * US, 250 * US)
     for airtime_ns, dcf, stated_us in ((b_ns, IEEE_802_11B, 1864), (a_ns, IEEE_802_11A, 345.5)):
         assert airtime_ns + dcf.difs_ns + dcf.cw_min * dcf.slot_ns / 2 == stated_us * US
@@ -185,7 +183,7 @@ def test_airtimes_are_whole_bits_and_symbols_rounded_up(octets: int, bit_rate_bp
     assert at_bit_rate_ns(octets, bit_rate_bps) == math.ceil(Fraction(8 * octets * 10**9, bit_rate_bps))
     for rate_bps in DSSS_RATES_BPS:
         payload_us = math.ceil(Fraction(8 * octets * 10**6, rate_bps))
-        assert ieee80211b_ns(octets, rate_bps, short_preamble=False) == (192 + payload_us) * US
+        assert ieee80211b_ns(octets, rate_bps) == (192 + payload_us) * US
     for rate_bps in OFDM_BITS_PER_SYMBOL:
         symbols = math.ceil(Fraction(16 + 8 * octets + 6, 4 * rate_bps // 10**6))  # service field, PSDU, tail
         assert ieee80211a_ns(octets, rate_bps) == (16 + 4 + 4 * symbols) * US
@@ -196,7 +194,7 @@ def test_airtimes_of_arrays_equal_those_of_elements():
     octets = np.array([0, 14, 76, 1536])
     for airtime_ns in (
         lambda n: at_bit_rate_ns(n, 9600),
-        lambda n: ieee80211b_ns(n, 5_500_000, short_preamble=True),
+        lambda n: ieee80211b_ns(n, 5_500_000),
         lambda n: ieee80211g_ns(n, 54_000_000),
     ):
         times_ns = airtime_ns(octets)

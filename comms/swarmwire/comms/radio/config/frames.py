@@ -53,7 +53,7 @@ def airtime_ns(radio: Radio, frame_bytes: IntArray) -> IntArray:
     if radio.lora_or_none is not None:
         return radio.lora_or_none.airtime_ns(frame_bytes)
     if radio.frame == "802.11b":
-        return ieee80211b_ns(frame_bytes, radio.bit_rate_bps, short_preamble=False)
+        return ieee80211b_ns(frame_bytes, radio.bit_rate_bps)
     if radio.frame == "802.11a":
         return ieee80211a_ns(frame_bytes, radio.bit_rate_bps)
     if radio.frame == "802.11g":
@@ -119,7 +119,7 @@ def eifs_acknowledgement_ns(radio: Radio) -> int:
     """Airtime of the acknowledgement in EIFS, in ns: at the lowest mandatory bit rate, 802.11b's at 2.4 GHz."""
     if _frame_of_control(radio) == "802.11a":
         return int(ieee80211a_ns(ACK_80211_BYTES, OFDM_MANDATORY_BPS[0]))
-    return int(ieee80211b_ns(ACK_80211_BYTES, DSSS_RATES_BPS[0], short_preamble=False))
+    return int(ieee80211b_ns(ACK_80211_BYTES, DSSS_RATES_BPS[0]))
 
 
 def _frame_of_control(radio: Radio) -> str:

@@ -17,7 +17,6 @@ from swarmwire.comms.radio.disruption import ALL, DROP, NEWEST, Disruption
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.phy.propagation import receiver_for, sensitivity_of
 from swarmwire.comms.radio.reception.receiver import chunk_success
-from swarmwire.comms.radio.timing import ESB
 from swarmwire.comms.robot.messages import CRTP_TAG
 from swarmwire.comms.robot.packets import Payloads, SentPackets, TxResult
 from tests.support.comms.radio import (
@@ -70,13 +69,6 @@ def test_frame_airtime_is_that_of_its_bits(rate: str):
     radio = crazyradio(rate)
     airtimes = airtime_ns(radio, np.array([1, 32]) + radio.overhead_bytes)
     assert airtimes.tolist() == [1e3 * NULL_US[rate], 1e3 * FRAME_US[rate]]
-
-
-@pytest.mark.parametrize("rate", RATES)
-def test_closed_form_is_that_of_the_specification(rate: str):
-    radio = crazyradio(rate)
-    exchange_ns = ESB.exchange_ns(32, 32, radio.overhead_bytes, radio.bit_rate_bps)
-    assert exchange_ns == pytest.approx(1e3 * EXCHANGE_US[rate], abs=1e-6)
 
 
 @pytest.mark.parametrize("rate", RATES)
