@@ -286,7 +286,12 @@ class GroupContext(StepContext):
 
     def end(self) -> Actions:
         """Return the robots' actions; handles of this tick raise RuntimeError from now on."""
-        actions = self._actions()
+        tables = {
+            name: SparseTable.from_dense(self.readings.rows, values, tuple(self._states) if name == "notes" else ())
+            for name, values in self._tables.items()
+        }
+        command = self.linear_mps, self.angular_radps, self.lateral_mps
+        actions = Actions(self.readings.rows, self.drive, *command, SentPackets.joined(self._outbox), **tables)
         vars(self).clear()
         return actions
 
@@ -296,12 +301,3 @@ class GroupContext(StepContext):
         if actions.drive.any() or any(len(getattr(actions, name)) for name in TABLES):
             raise RuntimeError("on_receive(…) reads packets and sends; to drive, light, actuate or note is for step(…)")
         return actions.sent
-
-    def _actions(self) -> Actions:
-        sent = SentPackets.joined(self._outbox)
-        command = self.linear_mps, self.angular_radps, self.lateral_mps
-        tables = {
-            name: SparseTable.from_dense(self.readings.rows, values, tuple(self._states) if name == "notes" else ())
-            for name, values in self._tables.items()
-        }
-        return Actions(self.readings.rows, self.drive, *command, sent, **tables)

@@ -88,7 +88,5 @@ def edges_above(pairs: IntArray, delivery: FloatArray | float, min_delivery: flo
 
     `delivery` is (k,), or one number for all pairs. The edges are in the order of the pairs: a < b in each, sorted.
     """
-    if isinstance(delivery, float):
-        return pairs if delivery >= min_delivery - ROUNDING else pairs[:0]
     joined = is_enough(delivery, min_delivery)
     return pairs if joined.all() else pairs[np.broadcast_to(joined, len(pairs))]

@@ -129,13 +129,13 @@ class Simulation:
         prepared = self._prepared
         with ExitStack() as stack:
             stack.push(prepared.writer.failed_to_start)
-            stack.enter_context(self._prepared.compiling)
+            stack.enter_context(prepared.compiling)
             # Set before observers begin, since they read `served` and `health`.
-            run = self._run = self._prepared.open(stack, self._observers, self.stop_conditions)
+            run = self._run = prepared.open(stack, self._observers, self.stop_conditions)
             with run.observers.begin(self.plan.static, agents_join=self.plan.config.listening is not None):
                 run.loop.backend.start()
             self._resources = stack.pop_all()
-        self._start_ns = self._prepared.clock.now_ns()
+        self._start_ns = prepared.clock.now_ns()
         return self
 
     def step(self) -> Truth:
