@@ -163,7 +163,7 @@ def test_replayed_live_events_happen_and_new_ones_are_refused():
     for call in (lambda: live.submit(KILL), lambda: live.end(2)):
         with pytest.raises(BadInput, match="the repetition"):
             call()
-    with pytest.raises(BadInput, match="^event 2 that was given: robots: is missing"):
+    with pytest.raises(BadInput, match="^live event 2: robots: is missing"):
         live_events(replayed=[LiveEvent(0, 2, {"do": "kill"})])
-    with pytest.raises(BadInput, match="^event 1 that was given: expected a number that no other event has"):
+    with pytest.raises(BadInput, match="^live event 1: expected a number that no other event has"):
         live_events(replayed=[LiveEvent(0, 1, KILL)])

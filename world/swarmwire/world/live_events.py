@@ -46,7 +46,7 @@ def event_of(table: Mapping[str, Any], scenario: Scenario, bodies: Mapping[str, 
     `bodies` are those of the groups, by name. BadInput names the key within the table and the expected value.
     """
     if AT_S in table:
-        raise BadInput("", AT_S, "expected no time: an event that is given takes effect at the start of the next tick")
+        raise BadInput("", AT_S, "expected no time: a live event takes effect at the start of the next tick")
     submitted = {KEY: {**deepcopy(dict(table)), AT_S: 0.0}}
     try:
         event = SubmittedEvent.model_validate(submitted).event
@@ -240,7 +240,7 @@ class LiveEvents:
         assert self._replayed is not None
         number = live_event.number
         if live_event.table is not None:
-            where = f"event {number} that was given"
+            where = f"live event {number}"
             if number in self._events or number < 0:
                 raise BadInput(where, "", "expected a number that no other event has")
             try:
