@@ -21,8 +21,8 @@ import msgpack
 from swarmwire.agent import Agent, Robot
 
 VICTIM = 0  # row of an honest robot
-HEAD, KIND_AT = struct.Struct("<6q"), 8
-TICK, ACTIONS, FAILED = 0, 4, 5
+HEAD = struct.Struct("<6q")
+ACTIONS, FAILED = 4, 5
 AT_S = 0.45  # begin of the attacks
 MARK = "31536017"  # seconds that a program of an agent sleeps, by which it is found
 

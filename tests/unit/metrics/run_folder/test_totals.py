@@ -148,9 +148,6 @@ def test_disk_that_refuses_a_total_fails_the_record(tmp_path, kind):
         recorder.end(None)
 
 
-TICK_NS = 100_000_000
-
-
 def line(*x_m):
     pose = np.zeros((len(x_m), 3))
     pose[:, 0] = x_m
