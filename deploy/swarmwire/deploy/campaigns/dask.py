@@ -31,7 +31,7 @@ from distributed.scheduler import KilledWorker
 from distributed.versions import VersionMismatchWarning
 from distributed.worker import WORKER_ANY_RUNNING, Worker
 
-from swarmwire.comms.base.clock import Clock, WallClock, to_ns
+from swarmwire.comms.base.clock import WallClock, to_ns
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.base.kernel_archive import read_archive, write_archive
 from swarmwire.comms.base.printable import LINES, printable
@@ -85,7 +85,6 @@ class DaskExecutor:
         scenario: Path,
         *,
         report: Report | None = None,
-        clock: Clock | None = None,
         connect_s: float = CONNECT_S,
         no_worker_s: float = NO_WORKER_S,
     ) -> None:
@@ -95,7 +94,7 @@ class DaskExecutor:
         reach or no worker comes in time.
         """
         self._name, self._limit, self._scenario = name, workers, scenario
-        self._report, self._clock, self._no_worker_ns = report or print_line, clock or WallClock(), to_ns(no_worker_s)
+        self._report, self._clock, self._no_worker_ns = report or print_line, WallClock(), to_ns(no_worker_s)
         self._campaign = f"swarmwire-{uuid4().hex}"  # name of the plugin, the resource and the topic of events
         self._tasks: dict[str, Task] = {}  # submitted tasks by dask's key
         self._futures = SimpleQueue[Any]()  # filled by callbacks, since as_completed has no timeout

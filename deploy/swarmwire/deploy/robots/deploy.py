@@ -37,7 +37,7 @@ from swarmwire.deploy.robots.release import (
     release_entries,
     write_release,
 )
-from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, Watcher
+from swarmwire.deploy.robots.result import HostFailed, RobotResult, Watcher
 from swarmwire.deploy.robots.units import RUNNING, control_unit, unit_state
 
 LOCAL_TARGET = re.compile(r"(^|/)(127\.|localhost|\[::1\]|usb:)")  # names another target on each machine
@@ -51,7 +51,7 @@ async def deploy(
     robots: Sequence[FleetRobot],
     contents: dict[str, list[ArchiveEntry]],
     environments: Environments,
-    watcher: Watcher = SILENT,
+    watcher: Watcher,
     *,
     restart: bool = False,
 ) -> list[RobotResult]:
@@ -59,7 +59,7 @@ async def deploy(
     with TemporaryDirectory() as folder:
         deployment = _Deployment(contents, environments, Path(folder), watcher, restart)
         return await on_hosts(
-            robots, fleet.known_hosts, deployment.deploy_robot, deployment.prepare, deployment.clean, watcher
+            robots, fleet.known_hosts, deployment.deploy_robot, deployment.prepare, deployment.clean, watcher=watcher
         )
 
 
@@ -165,7 +165,7 @@ PORTS = {"epuck2": 1000, "ros2": 7447}  # ports of drivers' protocols, for addre
 
 
 async def check(
-    fleet: Fleet, robots: Sequence[FleetRobot], faults: Mapping[str, BadInput], watcher: Watcher = SILENT
+    fleet: Fleet, robots: Sequence[FleetRobot], faults: Mapping[str, BadInput], watcher: Watcher
 ) -> list[RobotResult]:
     """Check each robot's host; return its properties or first fault. `faults` are those of the settings, by robot."""
 

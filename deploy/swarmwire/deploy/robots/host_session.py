@@ -25,7 +25,7 @@ from swarmwire.deploy.robots.connecting import CONNECT_TIMEOUT_S, connected, los
 from swarmwire.deploy.robots.fleet import FleetRobot, Host, hosts_of
 from swarmwire.deploy.robots.host_side.messages import HostFacts, HostRequest, ReadClock, Upload
 from swarmwire.deploy.robots.host_side.system import NO_SYSTEMD
-from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, Watcher
+from swarmwire.deploy.robots.result import HostFailed, RobotResult, Watcher
 
 BLOCK_BYTES = 1 << 18  # size of a write to the connection
 CLOCK_READINGS = 5
@@ -229,7 +229,8 @@ async def on_hosts(
     work: Work,
     before: HostWork = no_work,
     after: HostWork = no_work,
-    watcher: Watcher = SILENT,
+    *,
+    watcher: Watcher,
 ) -> list[RobotResult]:
     """Return the results of all robots in their order; hosts work at the same time, robots of a host in sequence."""
     ordered, gate = list(robots), asyncio.Semaphore(MAX_HOSTS)

@@ -32,7 +32,7 @@ Work = Callable[[asyncssh.SSHClientConnection, FleetRobot], Awaitable[RobotResul
 
 
 async def show_logs(
-    fleet: Fleet, robots: Sequence[FleetRobot], lines: int, on_line: OnLine, *, follow: bool = False
+    fleet: Fleet, robots: Sequence[FleetRobot], lines: int, on_line: OnLine, *, follow: bool
 ) -> list[RobotResult]:
     """Report the last lines of robots' agents, and with `follow` new ones, until it is cancelled."""
 

@@ -15,7 +15,7 @@ from swarmwire.deploy.robots.host_side.messages import (
     RollBack,
     UnitState,
 )
-from swarmwire.deploy.robots.result import SILENT, HostFailed, RobotResult, Watcher
+from swarmwire.deploy.robots.result import HostFailed, RobotResult, Watcher
 
 AT_REST = ("inactive", "failed")  # states of a unit that does not run
 RUNNING = ("active", "activating")
@@ -32,7 +32,7 @@ async def control_unit(session: HostSession, verb: str, robot: str) -> str:
     return (await session.request(ControlUnits(verb, [robot])))[robot]
 
 
-async def start(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher = SILENT) -> list[RobotResult]:
+async def start(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher) -> list[RobotResult]:
     """Start each robot's agent in its current release; running agents do not change.
 
     An agent that still runs after an emergency stop is a failure: only its end clears the latch.
@@ -62,7 +62,7 @@ async def start(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher = S
     return await on_hosts(robots, fleet.known_hosts, start_robot, prepare, watcher=watcher)
 
 
-async def stop(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher = SILENT) -> list[RobotResult]:
+async def stop(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher) -> list[RobotResult]:
     """Stop robots' agents, and with them the motors."""
 
     async def stop_robot(session: HostSession, robot: FleetRobot) -> RobotResult:
@@ -81,7 +81,7 @@ async def stop(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher = SI
     return await on_hosts(robots, fleet.known_hosts, stop_robot, watcher=watcher)
 
 
-async def rollback(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher = SILENT) -> list[RobotResult]:
+async def rollback(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher) -> list[RobotResult]:
     """Go back to the release before the current one; running robots are restarted with it."""
 
     async def lock(session: HostSession, _: list[FleetRobot]) -> None:
@@ -119,7 +119,7 @@ class RobotStatus:
         return not self.fault and not self.unit.startswith("failed")
 
 
-async def status(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher = SILENT) -> list[RobotStatus]:
+async def status(fleet: Fleet, robots: Sequence[FleetRobot], watcher: Watcher) -> list[RobotStatus]:
     """Return the status of each robot, with the fault of a host that does not answer."""
     statuses: dict[str, RobotStatus] = {}
 

@@ -247,7 +247,7 @@ def parse_factor(realtime: float | str | None) -> float | None:
 
 
 def checked_subtick(
-    subtick: float | None, factor: float | None, scenario: Scenario, has_crazyradio: bool = False
+    subtick: float | None, factor: float | None, scenario: Scenario, has_crazyradio: bool
 ) -> float | None:
     """Return the sub-tick of a run in s of wall time.
 

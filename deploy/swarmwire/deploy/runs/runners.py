@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from swarmwire.agent.isolation import DEFAULT_ISOLATION, Isolation
+from swarmwire.agent.isolation import Isolation
 from swarmwire.comms.base.errors import BadInput
 
 STOP_TIMEOUT_S = 3.0
@@ -42,12 +42,11 @@ class RunnerProcesses:
         agents: Sequence[str],
         processes: int,
         *,
-        name: str = "host",
-        is_lockstep: bool = False,
-        isolation: Isolation = DEFAULT_ISOLATION,
+        is_lockstep: bool,
+        isolation: Isolation,
     ) -> None:
         """Start the agent host; `is_lockstep`: the world waits for each answer."""
-        command = [sys.executable, "-m", AGENT_HOST, endpoint, run_id, ",".join(agents), name, str(processes)]
+        command = [sys.executable, "-m", AGENT_HOST, endpoint, run_id, ",".join(agents), "host", str(processes)]
         command += isolation.arguments
         # In a session of its own it does not receive Ctrl-C, and its group of processes can be ended at once.
         self._agent_host = subprocess.Popen(

@@ -37,7 +37,6 @@ from swarmwire.world.scenario.scenario import RobotsTable, Scenario
 from swarmwire.world.scenario.tables import AtPoses, OnGrid, PlacementTable, RegionTable
 
 ROBOT, HEADING = purpose("place of a robot"), purpose("heading of a robot")
-NO_STARTS: Mapping[str, FloatArray] = {}
 NOTHING_FREE = f"none of {MAX_CANDIDATES} places tried is free"
 
 
@@ -56,7 +55,7 @@ def place_arena(
     groups: Sequence[Group],
     seed: int,
     key: np.uint64,
-    starts: Mapping[str, FloatArray] = NO_STARTS,
+    starts: Mapping[str, FloatArray],
 ) -> Placement:
     """Place obstacles, lights and robots of the arena with this seed and key; BadInput names an entity without room.
 

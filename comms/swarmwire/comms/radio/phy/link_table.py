@@ -138,7 +138,7 @@ class LinkTable:
         propagation: PropagationParams,
         thresholds: Thresholds,
         measured: MeasuredLinks | None,
-        spreading: Spreading | None = None,
+        spreading: Spreading | None,
     ) -> None:
         """`measured` holds the links of the radio's trace; the caller keeps it up to date."""
         self._context, self._line_of_sight, self._measured = context, LineOfSight.create(context), measured
@@ -184,7 +184,7 @@ class LinkTable:
         forward, reverse = send_dbm[pairs.a] + receive_dbi[pairs.b], send_dbm[pairs.b] + receive_dbi[pairs.a]
         return forward - pairs.loss_db, reverse - pairs.reverse_db
 
-    def tune(self, propagation: PropagationParams, thresholds: Thresholds, spreading: Spreading | None = None) -> None:
+    def tune(self, propagation: PropagationParams, thresholds: Thresholds, spreading: Spreading | None) -> None:
         """Use these parameters from the next `move` on."""
         self.propagation, self._thresholds, self._spreading, self._is_new = propagation, thresholds, spreading, True
 

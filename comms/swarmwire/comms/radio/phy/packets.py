@@ -13,7 +13,7 @@ from swarmwire.comms.base.sentinels import ABSENT, BROADCAST, NO_PACKET, NO_ROBO
 from swarmwire.comms.radio.config.frames import airtime_ns, broadcast_airtime_ns, frame_bits
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.links import fill_remainder
-from swarmwire.comms.radio.phy.state import NO_RESULT, PACKET
+from swarmwire.comms.radio.phy.state import NO_RESULT
 from swarmwire.comms.radio.propagation.decibels import to_db
 from swarmwire.comms.radio.timing import IEEE_802_15_4
 from swarmwire.comms.radio.transmissions import (
@@ -53,7 +53,7 @@ class PacketTable:
         table: their state in the events, of dtype PACKET or, with 802.11n, MPDU.
     """
 
-    def __init__(self, rows: int, kind: np.dtype[Any] = PACKET) -> None:
+    def __init__(self, rows: int, kind: np.dtype[Any]) -> None:
         self.queued, self.table, self._kind = Transmissions(), np.zeros(0, kind), kind
         self._admission = Admission(rows, self.queued)
 

@@ -48,16 +48,16 @@ class CoverageProbe:
 def probe_coverage(
     scenario: Path,
     *,
-    seed: int | None = None,
-    overrides: Sequence[str] = (),
-    position_m: tuple[float, float] | None = None,
-    robot: str | None = None,
-    payload_bytes: int | None = None,
-    points: int = 200,
+    seed: int | None,
+    overrides: Sequence[str],
+    position_m: tuple[float, float] | None,
+    robot: str | None,
+    payload_bytes: int | None,
+    points: int,
 ) -> CoverageProbe:
-    """Probe from a position, or from the start of a robot with its heading, the first one by default.
+    """Probe from a position, or if it is None from the start of a robot with its heading; None: the first one.
 
-    The payload is the largest of the radio by default; the map has `points` along the longer side of the arena.
+    Without a payload it is the radio's largest one; the map has `points` along the longer side of the arena.
     BadInput for a scenario without a radio, or with measured links only, for a position outside the arena, and for an
     unknown robot.
     """

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from swarmwire.comms.base.clock import Clock, WallClock
+from swarmwire.comms.base.clock import WallClock
 from swarmwire.deploy.campaigns.tuning.best import FILE, FreshCheck, best_of, gained
 from swarmwire.deploy.campaigns.tuning.run import Tuned
 from swarmwire.deploy.campaigns.tuning.spec import SHARES, Goal, Tuning
@@ -95,8 +95,8 @@ def best_text(tuning: Tuning, trials: Sequence[TuningTrial]) -> str:
 class TuneProgress:
     """Observer that shows the number of finished trials, and the best trial."""
 
-    def __init__(self, console: Console, clock: Clock | None = None) -> None:
-        self._meter = Meter(console, clock or WallClock())
+    def __init__(self, console: Console) -> None:
+        self._meter = Meter(console, WallClock())
         self._tuning: Tuning | None = None
         self._trials: list[TuningTrial] = []
 

@@ -30,7 +30,7 @@ from swarmwire.deploy.runs.live_address import Live
 MAX_STEPS = 100_000
 
 
-def show_page(live: Live, options: ViewOptions, network: Network | None = None, *, begin: bool = False) -> None:
+def show_page(live: Live, options: ViewOptions, network: Network | None, *, begin: bool) -> None:
     """Show the run until `options.stopped()`, or until all browsers have closed the page of a run that is over.
 
     RunGone if the run does not answer. `network` has the certificates for a run on another machine. `begin` runs the

@@ -46,8 +46,7 @@ class EmulatedCrazyflie:
     """
 
     def __init__(self, body: Body, counts: Counter[str]) -> None:
-        self._body, self._counts = body, counts
-        self.flight, self._logs = Flight(), Logs()
+        self.flight, self._logs, self._counts = Flight(), Logs(), counts
         decks = {
             "deck.bcMultiranger": body.scan is not None,
             "deck.bcFlow2": "flow" in body.sensors,
