@@ -13,22 +13,17 @@ To add a loss, a delay or a measurement:
 2. Write its file in `stages/`: a class with its `name`, the `keys` of [radio] that it uses, and `create(context)`,
    which returns None if this radio does not need it; and a kernel. A loss is a `FrameLoss` (`loss.py`, which ends with
    a short one) with a kernel for one frame. It sees a `ReceivedFrame`: robots, packet and time, but neither distance
-   nor poses nor power; a loss that depends on distance is a path loss model, see below. A delay or a measurement is a
-   `Stage` with the FIELDS of its parameters, and a kernel that returns the delay or the value (`delays.py`). Docstrings
-   state formulas, sources and units. Draws are keyed by the arena's key, (sender, receiver, sequence) as indices in the
-   arena (`link_draws.py`), and a purpose of its own, so that no stage shifts the draws of another. A new drop reason is
-   a new `Fate`, with its colour in `FATE_COLORS` (`metrics/pictures/drawing/canvas.py`) and, if every receiver has it
-   on a link of its own, an entry in `LINK_FATES` (`metrics/records/run_folder/radio_totals.py`). A new measurement is a
-   field of LINK (`links.py`), listed in `Measures.columns`.
+   nor poses nor power; a loss that depends on distance is a path loss model (CONTRIBUTING.md). A delay or a measurement
+   is a `Stage` with the FIELDS of its parameters, and a kernel that returns the delay or the value (`delays.py`).
+   Docstrings state formulas, sources and units. Draws are keyed by the arena's key, (sender, receiver, sequence) as
+   indices in the arena (`link_draws.py`), and a purpose of its own, so that no stage shifts the draws of another. A new
+   drop reason is a new `Fate`, with its colour in `FATE_COLORS` (`metrics/pictures/drawing/canvas.py`) and, if every
+   receiver has it on a link of its own, an entry in `LINK_FATES` (`metrics/records/run_folder/radio_totals.py`). A new
+   measurement is a field of LINK (`links.py`), listed in `Measures.columns`.
 3. List the class, and call the kernel: a loss in `LOSS_MODELS`, `Losses` and `loss_fate` (`losses.py`); another stage
    in `AFTER_RECEPTION` and `after_reception` below, in its position.
 
 A loss that depends on the link (`varies`) has a `delivery`, which the radio graph and the coverage of both models use.
-
-To add a path loss model, which a PHY applies before reception: a frozen dataclass in `config/path_loss_models.py` whose
-`curve` returns a `LossCurve`; its name in `MODELS` and `MODEL_KEYS`, its field and its case in `path_loss_model`
-(`config/radio.py`); its field in `PATH_LOSS` (`config/presets.py`); and a test of its formula in
-`tests/unit/comms/radio/test_path_loss.py`. Compiled code stays as it is.
 """
 
 from typing import Any, NamedTuple
