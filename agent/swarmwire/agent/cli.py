@@ -209,11 +209,7 @@ def _drivers(_: argparse.Namespace) -> int:
     return ENDED
 
 
-def _join(parsed: argparse.Namespace) -> int:
-    return join_parsed(parsed)
-
-
-_COMMANDS = {"join": _join, "run": _run, "check": _check, "stop-motors": _stop_motors, "drivers": _drivers}
+_COMMANDS = {"join": join_parsed, "run": _run, "check": _check, "stop-motors": _stop_motors, "drivers": _drivers}
 
 
 def _settings(parsed: argparse.Namespace) -> RobotSettings:

@@ -57,10 +57,6 @@ class RunnerLog:
         if loss.traceback:
             self.report(loss.traceback.rstrip())
 
-    def add_event(self, event: RunnerEvent) -> None:
-        """Add a runner that joined, left, was lost or returned."""
-        self.events.append(event)
-
     def add_refusal(self, runner: str, reason: str) -> None:
         """Report a runner that was not admitted."""
         self.report(f"refused {runner!r}: {reason}")
@@ -125,7 +121,7 @@ def runner_backend(settings: BackendSettings) -> Generator[AgentBackend]:
             log.report(f"lost runner {loss}{_remedy(settings, takeover)}")
 
         def change(event: RunnerEvent, _: tuple[str, ...]) -> None:
-            log.add_event(event)
+            log.events.append(event)
             if event.what != "lost":  # `lose` reports a loss, with a remedy
                 log.report(str(event))
 
@@ -163,7 +159,7 @@ def joined_backend(settings: BackendSettings, listening: Listening) -> Generator
     log, observer = settings.log, listening.observer
 
     def change(event: RunnerEvent, free: tuple[str, ...]) -> None:
-        log.add_event(event)
+        log.events.append(event)
         log.report(str(event))
         observer.changed(event, free)
 
