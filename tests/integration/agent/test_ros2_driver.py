@@ -82,16 +82,6 @@ def test_driver_reads_topics_in_the_units_and_signs_of_sensors(transport):
     assert single == pytest.approx(EXPECTED)
 
 
-@TRANSPORTS
-def test_driver_reads_only_requested_sensors_and_blanks_at_first(transport):
-    with base_and_driver(transport) as (_, driver):
-        assert driver.sense(frozenset({"compass"})).keys() == {"compass.heading_rad"}
-        lost = driver.sense(ALL)
-    assert np.isinf(lost["scan.range_m"]).all()
-    assert not lost["proximity.value"].any()
-    assert np.isnan(lost["odometry.left_m"]).all()
-
-
 @pytest.mark.parametrize(("transport", "stamped"), [("bridge", False), ("rmw", True)])
 def test_commands_are_repeated_until_a_stop_from_another_thread(transport, stamped):
     with base_and_driver(transport, stamped=stamped) as (base, driver):
@@ -187,25 +177,6 @@ def test_messages_that_rmw_would_drop_are_counted():
             base.publish("imu", imu(), attachment=attachment)
         until(lambda: driver.counts()["without_attachment"], lambda count: count == 2)
         assert np.isnan(driver.sense(frozenset({"imu"}))["imu.turn_radps"][0])
-
-
-def test_disconnected_base_is_lost_and_reconnects_at_rest():
-    with base_and_driver("bridge") as (base, driver):
-        assert driver.counts()["reconnections"] == 0
-        base.close()
-        with pytest.raises(DriverLost, match="is cut"):
-            until(lambda: driver.sense(frozenset({"battery"})), lambda _: False)
-        with pytest.raises(DriverLost):
-            driver.act(Command(0.1))
-        driver.stop()
-        again = RosBase("bridge", endpoint=base.address)
-        try:
-            driver.open()
-            assert again.command() == (0.0, 0.0)
-            assert driver.counts()["reconnections"] == 1
-        finally:
-            driver.close()
-            again.close()
 
 
 @TRANSPORTS

@@ -5,7 +5,6 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-import zenoh
 
 from swarmwire.agent.radios import world_radio
 from swarmwire.agent.radios.tracker import Tracker as RobotsTracker
@@ -14,9 +13,7 @@ from swarmwire.comms.base.clock import NS_PER_S, WallClock
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPackets, SentPackets, TxResult, TxStatuses
 from swarmwire.comms.robot.tick_io import SparseTable
-from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.network import Network
-from swarmwire.comms.wire.radio_bridge import encode_bridged
 from swarmwire.comms.wire.robot_network import open_swarm
 from swarmwire.comms.wire.sessions import close_session
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, EmulatedTracker, RadioBridge
@@ -223,39 +220,6 @@ def test_missing_world_is_reported_after_a_timeout():
     finally:
         close_session(session)
     assert clock.slept_until[-1] - clock.slept_until[0] > 5 * NS_PER_S
-
-
-def test_bridge_counts_malformed_frames_of_robots():
-    with bridged() as (bridge, session):
-        peer = session()
-        radio = joined_radio(peer)
-        key = KEYS.bridge_sent("flock-1")
-        other = frames.encode("actions", 1, {"rows": np.array([2]), "command": np.zeros((4, 1))})
-        for data in (b"", b"garbage", frames.encode("tick", 1, {}), other):
-            peer.put(key, data)
-        peer.put(key, bytes(2**20 + 1))
-        peer.put(KEYS.bridge_sent("flock-0"), b"")
-        peer.put(KEYS.bridge_sent("*"), b"")
-        radio.send(words(3.0, row=1))
-        assert pop_packets(bridge, 1).sender.tolist() == [1]
-        counts = bridge.counts()
-        del counts["packets_from_robots"]
-        assert counts == {"frames_malformed": 4, "frames_of_nobody": 2, "frames_oversized": 1}
-
-
-def test_world_radio_counts_malformed_frames_of_the_bridge():
-    with bridged() as (bridge, session):
-        radio = joined_radio(session())
-        exchange(bridge, radio)
-        of_another = encode_bridged(3, 1, received((2, 0, 1, 1)), NO_TX_STATUSES)
-        for data in (b"", frames.encode("end", 3, {}), of_another):
-            bridge.session.put(KEYS.bridge_received("flock-1"), data)
-        blocking = zenoh.CongestionControl.BLOCK  # a busy machine drops no fragment
-        bridge.session.put(KEYS.bridge_received("flock-1"), bytes(2**20 + 1), congestion_control=blocking)
-        bridge.publish(4, received((1, 0, 5, 1)), NO_TX_STATUSES)
-        assert received_by(radio, 1) == [(0, 5, 5.0)]
-        counts = radio.counts()
-        assert (counts["frames_malformed"], counts["frames_oversized"]) == (3, 1)
 
 
 def test_slow_robot_counts_dropped_frames(monkeypatch):

@@ -149,15 +149,6 @@ def test_odometry_integrates_the_wheels_without_subscribers():
         assert odom.pose.pose.position.x == pytest.approx(0.08)
 
 
-def test_static_frames_alone_are_encoded_without_subscribers(monkeypatch):
-    with ros_node() as node:
-        encoded: list[str] = []
-        monkeypatch.setattr(node.gateway._messages, "encode", lambda kind, _: (encoded.append(kind), b"")[1])
-        for _ in range(10):
-            node.publish()
-        assert encoded == 2 * [FRAMES["tf_static"]]  # one per robot, in the first tick of a second
-
-
 @pytest.mark.parametrize("key", ["flock_1/tf_static", "0/flock_1/tf_static/tf2_msgs::msg::dds_::TFMessage_/*"])
 def test_late_subscriber_with_history_gets_the_static_frames(key):
     """The subscription of transient local readers in rmw_zenoh and bridges."""
@@ -243,14 +234,6 @@ def test_base_without_commands_stops_once():
         assert node.gateway.counts() == {"command_timeouts": 1}
 
 
-def test_base_at_rest_has_no_command_timeout():
-    with ros_node() as node:
-        node.session.put("flock_1/cmd_vel", independent.twist(0.0, 0.0).serialize())
-        assert node.next_command() == (0.0, 0.0)
-        node.clock.time_ns += 10**12
-        assert not node.gateway.pop_commands().drive.any()
-
-
 def test_malformed_commands_are_counted_and_ignored():
     with ros_node() as node:
         broken = [b"", b"\0\1\0\0", GO[:-1], GO + bytes(8), b"\7" * 52, independent.twist(np.nan, 0.0).serialize()]
@@ -261,14 +244,6 @@ def test_malformed_commands_are_counted_and_ignored():
         node.session.put(TWIST_STAMPED, GO, attachment=PROPER)
         until(node.gateway.counts, lambda counts: counts == {"malformed": len(broken) + 1, "no_attachment": 3})
         assert not node.gateway.pop_commands().drive.any()
-
-
-def test_newest_of_several_commands_counts():
-    with ros_node() as node:
-        for speed in (0.05, 0.06, 0.07):
-            node.session.put("flock_1/cmd_vel", independent.twist(speed, 0.0).serialize())
-        last: list[float] = []
-        until(lambda: (last.append(node.next_command()[0]), last[-1])[1], lambda speed: speed == 0.07)
 
 
 def tokens(node, pattern: str) -> set[str]:

@@ -123,26 +123,6 @@ def test_ros2_sdk_lists_topics_of_bases_and_of_their_radios(client):
     assert "/tb_0/radio/tb_0/map" not in listed
 
 
-def test_ros2_sdk_drives_a_base_and_receives_its_readings(client):
-    for topic, kind in (("odom", "nav_msgs/msg/Odometry"), ("scan", "sensor_msgs/msg/LaserScan")):
-        client.subscribe(f"/tb_0/{topic}", kind)
-    twist = client.publisher("/tb_0/cmd_vel", TWIST)
-    world = client.simulation.world
-    before_m = world.pose[0, 0]
-    kinds = sdk.ZenohSession.get_instance().store.types
-    make = kinds["geometry_msgs/msg/Vector3"]
-
-    def drive() -> None:
-        twist.publish(linear=make(0.1, 0.0, 0.0), angular=make(0.0, 0.0, 0.3))
-
-    client.step_until(lambda: world.pose[0, 0] - before_m > 0.15, drive)
-    client.step_until(lambda: client.received["/tb_0/scan"] and client.received["/tb_0/odom"], drive)
-    odom, scan = client.received["/tb_0/odom"][-1], client.received["/tb_0/scan"][-1]
-    assert odom.twist.twist.linear.x == pytest.approx(0.1, abs=0.02)
-    assert odom.twist.twist.angular.z == pytest.approx(0.3, abs=0.1)
-    assert len(scan.ranges) == 360
-
-
 def test_ros2_sdk_receives_a_map_of_another_robot_over_the_radio(client):
     client.subscribe("/tb_1/radio/tb_0/map", MAP)
     maps, kinds = client.publisher("/tb_0/map", MAP), sdk.ZenohSession.get_instance().store.types
@@ -170,18 +150,3 @@ def test_ros2_sdk_receives_a_map_of_another_robot_over_the_radio(client):
     assert numbers == sorted(set(numbers))
     assert all(len(each.data) == 4000 and set(each.data.tolist()) == {each.data[0]} for each in received)
     assert (received[0].info.width, received[0].header.frame_id) == (80, "map")
-
-
-def test_ros2_sdk_sends_and_receives_bytes_over_the_radio(client):
-    client.subscribe("/tb_0/radio/rx", BYTES)
-    packets, kinds = client.publisher("/tb_1/radio/tx", BYTES), sdk.ZenohSession.get_instance().store.types
-    dimension = kinds["std_msgs/msg/MultiArrayDimension"]("tb_0", 3, 3)
-    layout = kinds["std_msgs/msg/MultiArrayLayout"]([dimension], 0)
-
-    def publish() -> None:
-        packets.publish(layout=layout, data=np.array([1, 2, 250], np.uint8))
-
-    client.step_until(lambda: client.received["/tb_0/radio/rx"], publish)
-    packet = client.received["/tb_0/radio/rx"][0]
-    assert packet.data.tolist() == [1, 2, 250]
-    assert packet.layout.dim[0].label == "tb_1"

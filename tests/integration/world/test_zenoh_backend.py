@@ -15,7 +15,6 @@ from pathlib import Path
 
 import psutil
 import pytest
-import zenoh
 
 from swarmwire.agent import runner
 from swarmwire.comms.base.clock import WallClock, to_ns
@@ -25,7 +24,7 @@ from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.join import GroupInfo, JoinRequest, SessionInfo
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.limits import MAX_BYTES, JoinLimits
+from swarmwire.comms.wire.limits import JoinLimits
 from swarmwire.comms.wire.sessions import closed_after, open_runner, unix_endpoint
 from swarmwire.world.backends import zenoh_backend
 from swarmwire.world.backends.join_policy import JoinPolicy
@@ -113,40 +112,6 @@ def thread(endpoint: str, name: str) -> Generator["queue.SimpleQueue[BaseExcepti
 
 def act(backend: LockstepBackend, tick: int, rows: list[int]) -> Actions:
     return backend.act(tick, one_group(tick, rows), SILENCE)
-
-
-def test_foreign_frames_are_counted_and_the_run_continues(endpoint: str) -> None:
-    keys = Keys(RUN)
-    with thread(endpoint, "r0"), opened(endpoint, parts("Counter", ROWS)) as backend:
-        backend.start()
-        with open_runner(endpoint) as foreign:
-            for key in (keys.answer("r0"), keys.answer("stranger"), keys.alive("stranger")):
-                foreign.put(key, b"\xc1 no frame")
-            foreign.put(keys.answer("r0"), bytes(MAX_BYTES + 1), congestion_control=zenoh.CongestionControl.BLOCK)
-            foreign.put(keys.answer("r0"), frames.encode("actions", 10**9, {}))
-            foreign.put(keys.answer("r0"), frames.encode("ready", 0, {}))
-            foreign.delete(keys.answer("r0"))
-            queries = [
-                foreign.get(key, payload=payload)
-                for key, payload in (
-                    (keys.join("x"), b"\xc1"),
-                    (keys.any_join, JoinRequest().encode()),
-                    (keys.join("x"), JoinRequest().encode()),
-                )
-            ]
-            names = {"malformed_frames", "oversized_frames", "unknown_runner_frames"}
-            names |= {"wrong_tick_frames", "unexpected_kind_frames"}
-            tick = 0
-            while not names | {"bad_join", "refused_join"} <= set(backend.counts()) or backend.counts()["bad_join"] < 2:
-                got = act(backend, tick, ROWS)
-                tick += 1
-                assert got.linear_mps.tolist() == [float(tick)] * len(ROWS)
-            errors = [reply.err for replies in queries for reply in replies]
-        texts = [error.payload.to_string() if error else "granted" for error in errors]
-        assert [text.split()[0] for text in texts] == ["malformed:", "expected", "all"]
-        got = act(backend, tick, ROWS)
-        assert got.linear_mps.tolist() == [tick + 1.0] * len(ROWS)
-        assert set(backend.counts()) == names | {"bad_join", "refused_join"}
 
 
 @pytest.mark.parametrize(("agent", "reason"), [("Unmade", "no memory left"), ("Nowhere", "no such name: 'Nowhere'")])

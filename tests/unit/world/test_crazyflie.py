@@ -15,7 +15,7 @@ from swarmwire.comms.robot.bodies.body import body_from, load_body
 from swarmwire.world.gateways.crazyflie.flight import STANDSTILL, SupervisorState, unpacked_attitude
 from swarmwire.world.gateways.crazyflie.gateway import addresses_of
 from swarmwire.world.gateways.crazyflie.robot import EmulatedCrazyflie
-from swarmwire.world.gateways.crazyflie.trajectories import TrajectoryPoint, compressed_pieces_of, piece_between
+from swarmwire.world.gateways.crazyflie.trajectories import compressed_pieces_of
 
 TICK_MS = 50
 HOVER = struct.pack("<Bffff", 10, 0.2, 0.1, 30.0, 0.5)  # m/s, m/s, degrees/s, m
@@ -162,18 +162,6 @@ def test_parameters_and_trajectories_outlive_their_client() -> None:
     assert start(flight, 1) == 0
 
 
-def test_hover_setpoints_lift_off_and_move_the_crazyflie() -> None:
-    flight = Flight()
-    flight.send(7, 0, HOVER)
-    assert flight.robot.flight.motion == STANDSTILL  # not yet on the floor
-    flight.hover(3000)
-    flight = flight.robot.flight
-    assert flight.state is SupervisorState.FLYING
-    assert flight.height_m == pytest.approx(0.5, abs=0.01)
-    assert (flight.motion.forward_mps, flight.motion.left_mps) == pytest.approx((0.2, 0.1))
-    assert flight.motion.turn_radps == pytest.approx(np.pi / 6)
-
-
 def test_crazyflie_without_setpoints_levels_out_then_locks() -> None:
     flight = Flight()
     flight.hover(3000)
@@ -220,33 +208,6 @@ def supervisor(flight: Flight) -> bytes:
     return answer[2:]
 
 
-def test_high_level_commander_takes_off_moves_and_lands() -> None:
-    flight = Flight()
-    assert flight.send(8, 0, struct.pack("<BBff?f", 7, 0, 0.6, 0.0, True, 2.0))[3] == 0
-    flight.pass_ms(2500)
-    assert flight.robot.flight.height_m == pytest.approx(0.6, abs=0.02)
-    assert flight.send(8, 0, struct.pack("<BBBBfffff", 12, 0, 0, 0, 1.0, 0.5, 0.8, 0.0, 3.0))[3] == 0
-    flight.pass_ms(4000)  # without readings the estimate follows the setpoint
-    estimate = flight.robot.flight.estimate
-    assert (estimate.x_m, estimate.y_m) == pytest.approx((1.0, 0.5), abs=0.02)
-    assert flight.robot.flight.height_m == pytest.approx(0.8, abs=0.02)
-    assert flight.send(8, 0, struct.pack("<BBff?f", 8, 0, 0.0, 0.0, True, 2.0))[3] == 0
-    flight.pass_ms(5000)
-    assert flight.robot.flight.height_m == 0.0
-    assert not flight.robot.flight.setpoint.flies
-    assert flight.robot.flight.state is SupervisorState.READY
-
-
-def test_battery_is_low_after_five_seconds_below_the_voltage() -> None:
-    flight = Flight()
-    state = items(flight, 5)["pm.state"][0]
-    flight.send(5, 1, struct.pack("<BBBH", 6, 1, 0x44, state))
-    flight.send(5, 1, b"\3\1\x0a")
-    charged = flight.pass_ms(1000, battery__voltage_v=np.array(3.3))
-    low = flight.pass_ms(6000, battery__voltage_v=np.array(3.1))
-    assert [datagram[-1] for datagram in (charged[-1], low[30], low[-1])] == [0, 0, 3]
-
-
 def straight_piece(x_m: float, duration_s: float = 1.0) -> bytes:
     """A piece from (0, 0, 0.5) to (x, 0, 0.5) at constant speed."""
     axes = [0.0, x_m / duration_s, *[0.0] * 6, *[0.0] * 8, 0.5, *[0.0] * 7, *[0.0] * 8]
@@ -272,23 +233,6 @@ def define(flight: Flight, number: int, kind: int, offset: int = 0, pieces: int 
 def start(flight: Flight, number: int, *, flags: tuple[int, int, int] = (0, 0, 0), stretch: float = 1.0) -> int:
     """The result of a start; `flags`: relative place, relative yaw, reversed."""
     return flight.send(8, 0, struct.pack("<BBBBBBf", 13, 0, *flags, number, stretch))[3]
-
-
-def test_uploaded_trajectory_is_flown() -> None:
-    flight = Flight()
-    climb = piece_between(
-        TrajectoryPoint(np.zeros(4), np.zeros(4)), TrajectoryPoint(np.array([1.0, 0, 0.7, 0]), np.zeros(4)), 4.0
-    )
-    data = struct.pack("<33f", *climb.coefficients.ravel(), climb.duration_s)
-    upload(flight, data)
-    assert flight.send(4, 1, struct.pack("<BIB", 0, 0, 8))[5:] == b"\0" + data[:8]
-    assert define(flight, 1, 0) == 0
-    assert start(flight, 1, flags=(1, 0, 0)) == 0
-    flight.pass_ms(5000)
-    assert flight.robot.flight.estimate.x_m == pytest.approx(1.0, abs=0.02)
-    assert flight.robot.flight.height_m == pytest.approx(0.7, abs=0.02)
-    assert start(flight, 9) != 0
-    assert flight.counts["plans_refused"] == 1
 
 
 def test_trajectories_follow_the_newest_definition_and_memory() -> None:

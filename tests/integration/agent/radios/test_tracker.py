@@ -100,26 +100,6 @@ def test_newest_pose_counts_until_it_is_a_second_old():
         assert tracker.pose("stranger", NOW_NS) is None
 
 
-def test_malformed_poses_are_counted_and_leave_the_last_one():
-    with peers(2) as (session, other):
-        tracker = Tracker(session, KEYS, ROBOTS)
-        tracker.open()
-        good = packed((1.0, 2.0, 3.0))
-        put_pose(other, tracker, "flock-0", (1.0, 2.0, 3.0))
-        bad = [b"", good[:-1], good + b"\0", *(packed((1.0, 2.0, x)) for x in (math.nan, math.inf))]
-        bad += [packed((x, 0.0, 0.0)) for x in (math.nan, -math.inf)]
-        for data in bad:
-            other.put(KEYS.pose("flock-0"), data)
-        other.delete(KEYS.pose("flock-0"))
-        other.put(KEYS.pose("stranger"), good)
-        other.put(f"{KEYS.root}/pose/*", packed((9.0, 9.0, 9.0)))
-        until(lambda: tracker.unknown == 2)
-        assert tracker.counts() == {"poses_malformed": len(bad) + 1, "poses_of_unknown": 2}
-        assert tracker.pose("flock-0", NOW_NS) == (1.0, 2.0, 3.0)
-        tracker.close()
-        tracker.close()
-
-
 def tracked(session, other, clock, of_receiver=(1.0, 1.0, math.pi / 2), of_sender=(1.0, 3.0, 0.0)) -> Tracker:
     """A tracker at flock-0 that has seen flock-0 and flock-1."""
     tracker = Tracker(session, KEYS, ROBOTS)

@@ -132,22 +132,6 @@ def test_lost_reading_leaves_the_previous_number(gateway: Epuck2Gateway) -> None
     assert readings["tof"] > 2000
 
 
-@pytest.mark.parametrize(
-    ("request_bits", "parts"),
-    [(0, {0: 3}), (1, {0: 1}), (2, {0: 2}), (3, {0: 1, 38401: 2})],
-    ids=["none", "one", "two", "both"],
-)
-def test_gateway_answers_the_last_command_repeatedly(
-    gateway: Epuck2Gateway, request_bits: int, parts: dict[int, int]
-) -> None:
-    size = {3: 1, 1: 38401, 2: 105}
-    with program(gateway) as robot:
-        robot.sendall(command(request=request_bits))
-        for _ in range(5):
-            answer = received(robot, sum(size[first] for first in parts.values()))
-            assert {at: answer[at] for at in parts} == parts
-
-
 def test_speeds_are_clipped_per_wheel_as_in_the_firmware(gateway: Epuck2Gateway) -> None:
     with program(gateway, robot=2) as robot:
         exchanged(robot, command(left=-2000, right=550))
@@ -168,14 +152,6 @@ def test_leds_change_only_with_new_values(gateway: Epuck2Gateway) -> None:
     assert changes.rows.tolist() == [1, 1]
     assert dict(zip(changes.slot.tolist(), changes.value.tolist(), strict=True)) == {6: 0xFF0000, 1: 0xFF0080}
     assert dict(zip(later.slot.tolist(), later.value.tolist(), strict=True)) == {6: 0, 7: 0x006600}
-
-
-def test_front_and_body_led_are_the_last_two_of_the_body(gateway: Epuck2Gateway) -> None:
-    with program(gateway, robot=1) as robot:
-        exchanged(robot, command(leds=0b110000))
-        changes = gateway.pop_commands().leds
-    assert dict(zip(changes.slot.tolist(), changes.value.tolist(), strict=True)) == {8: 0xFF0000, 9: 0x00FF00}
-    assert faults(gateway) == {}
 
 
 def test_image_shows_the_view_ahead(gateway: Epuck2Gateway) -> None:

@@ -1,6 +1,6 @@
 """Sensors of ROS 2 robots: laser scans and all others."""
 
-from math import cos, hypot, inf, nan, pi, radians, sin
+from math import cos, hypot, inf, nan, pi, sin
 from types import SimpleNamespace
 
 import numpy as np
@@ -27,8 +27,6 @@ from swarmwire.comms.protocols.ros2.readings import (
     battery_state,
     brightness_of,
     charge_of,
-    illuminance,
-    topics_of_light,
 )
 from swarmwire.comms.protocols.ros2.transforms import proximity_range
 from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
@@ -37,7 +35,7 @@ from swarmwire.comms.robot.sensors.rays import ProximitySpec
 from swarmwire.comms.robot.sensors.scan import ScanSpec
 from swarmwire.comms.robot.sensors.simple import BatterySpec, OdometrySpec
 from tests.support.comms.protocols.ros2 import independent
-from tests.support.comms.protocols.ros2.independent import Quaternion, Vector3, odometry
+from tests.support.comms.protocols.ros2.independent import Quaternion, odometry
 
 MESSAGES = Messages("jazzy")
 LINEAR = {"kind": "quadratic", "a": 0.0, "b": -2.0, "c": 1.0, "reach_m": 0.5}
@@ -312,17 +310,6 @@ def test_imu_motion_survives(forward, left, turn, heading, north_deg):
     assert back.heading_rad == pytest.approx(heading, abs=1e-9)
 
 
-def test_imu_axes_follow_the_ros_convention():
-    zeros = [0.0] * 9
-    quarter = Quaternion(z=2**-0.5, w=2**-0.5)
-    message = independent.Imu(
-        independent.header(), quarter, zeros, Vector3(0.1, 0.2, 0.3), zeros, Vector3(1.0, 2.0, 9.8), zeros
-    )
-    assert motion_of(received_reading(IMU, message), 0.0) == pytest.approx((1.0, 2.0, 0.3, pi / 2))
-    assert motion_of(received_reading(IMU, message), 90.0).heading_rad == pytest.approx(pi)
-    assert motion_of(received_reading(IMU, message), 100.0).heading_rad == pytest.approx(radians(-170.0))
-
-
 def test_imu_quantities_not_measured_are_nan():
     for kind in range(3):
         motion = Motion(*(1.0 if kind == 0 else nan,) * 2, 2.0 if kind == 1 else nan, 0.5 if kind == 2 else nan)
@@ -380,11 +367,6 @@ def test_battery_charge_is_the_percentage_or_from_voltage(percentage, voltage_v,
 def test_illuminance_reads_one_at_full_lux(lux, value):
     message = independent.Illuminance(independent.header(), lux, 0.0)
     assert brightness_of(received_reading(ILLUMINANCE, message), 800.0) == value
-
-
-def test_light_is_published_in_lux():
-    assert sent(ILLUMINANCE, illuminance(MESSAGES, 0.25, 800.0, "cell", 0)).illuminance == 200.0
-    assert topics_of_light("illuminance", 3) == ("illuminance_0", "illuminance_1", "illuminance_2")
 
 
 @pytest.mark.parametrize(("value", "distance_m"), [(0.0, inf), (0.1, inf), (0.104, inf), (0.12, 0.44), (1.0, 0.0)])
