@@ -30,6 +30,8 @@ STATE = {
     "lost_share": 0.0,
     "collided_share": 0.01,
     "late": 0.004,
+    "sent_late_p99_ms": 10.0,
+    "closings": 0,
 }
 
 
@@ -54,6 +56,14 @@ def test_numbers_have_the_interval_of_a_median_from_order_statistics():
     assert "| 10.5 (6.0 to 15.0) |" in numbers_of(rows)
     late = [row | ({"recovery_p50_s": None} if row["seed"] > 12 else {}) for row in rows]
     assert "| 10.5 (6.0 to –) |" in numbers_of(late)
+
+
+def test_numbers_count_the_runs_in_which_zenoh_closed_a_transport():
+    rows = [
+        BEGIN | STATE | {NAME: name, "seed": seed, "closings": closings}
+        for name, seed, closings in (("udp", 1, 0), ("zenoh-peer", 1, 0), ("zenoh-peer", 2, 3))
+    ]
+    assert "1 of 2 runs of zenoh-peer." in numbers_of(rows)
 
 
 def test_numbers_pair_runs_with_the_same_seed():

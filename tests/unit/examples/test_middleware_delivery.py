@@ -19,10 +19,12 @@ def records(*rows):
     )
 
 
-def logs(*messages, halves=(True, False), split_s=(20.0, 40.0), end_s=60.0):
+def logs(*messages, begin_s=0.0, halves=(True, False), split_s=(20.0, 40.0), end_s=60.0):
     """Logs of messages (topic, sender, receiver, sent_s, received_s)."""
     names = ("topic", "sender", "receiver", "sent_s", "received_s")
-    return Logs(pl.DataFrame(list(messages), schema=list(names), orient="row"), 0.0, np.array(halves), split_s, end_s)
+    return Logs(
+        pl.DataFrame(list(messages), schema=list(names), orient="row"), begin_s, np.array(halves), split_s, end_s
+    )
 
 
 def of_topic(topic, result):
@@ -100,20 +102,21 @@ def test_discovery_and_recovery_are_times_to_the_first_message_of_a_pair():
         ("state", 0, 1, 39.0, 40.5),  # sent before the end of the split
         ("state", 0, 1, 41.0, 47.0),
         ("state", 1, 0, 41.0, None),
+        begin_s=0.5,
         halves=(True, False, True),
     )
     row = of_topic("state", result)
-    assert (row["pairs"], row["discovered"], row["discovery_p50_s"], row["discovery_max_s"]) == (3, 2, 6.0, None)
+    assert (row["pairs"], row["discovered"], row["discovery_p50_s"], row["discovery_max_s"]) == (3, 2, 5.5, None)
     assert (row["cut_pairs"], row["recovered"], row["recovery_p50_s"], row["recovery_max_s"]) == (2, 1, 7.0, None)
 
 
 def test_age_before_the_split_is_averaged_over_time_and_pairs():
-    """One pair hears each 2 s, at once: 1 s old on average. The other never hears: 15 s."""
+    """Middlewares begin at 2 s. One pair hears each 2 s, at once: 1 s old on average. The other never hears: 13 s."""
     times = [2.0 * k for k in range(5, 11)]
-    result = logs(*(("state", 0, 1, t, t) for t in times), ("state", 1, 0, 10.0, None))
+    result = logs(*(("state", 0, 1, t, t) for t in times), ("state", 1, 0, 10.0, None), begin_s=2.0)
     row = of_topic("state", result)
-    assert row["age_mean_s"] == pytest.approx((1.0 + 15.0) / 2, abs=0.02)
-    assert row["age_p95_s"] == pytest.approx(19.0, abs=0.02)
+    assert row["age_mean_s"] == pytest.approx((1.0 + 13.0) / 2, abs=0.02)
+    assert row["age_p95_s"] == pytest.approx(17.0, abs=0.02)
 
 
 def test_programs_know_the_addresses_of_their_group_and_when_to_send():
