@@ -45,6 +45,9 @@ DIFFERENCES = (  # hypothesis, first and second middleware, title, and the topic
     ("H3", "dds-wifi", "dds", *MAPS),
     ("", "dds-wifi", "udp", *AGE),
     ("", "zenoh-router", "zenoh-peer", *AGE),
+    ("", "zenoh-router", "udp", *STATES),
+    ("", "zenoh-router", "zenoh-peer", *STATES),
+    ("", "zenoh-router", "zenoh-peer", "recovery p50, s", ("state", "recovery_p50_s", ".1f")),
     ("H7", "zenoh-peer", "udp", "recovery p50, s", ("state", "recovery_p50_s", ".1f")),
 )
 
