@@ -34,7 +34,7 @@ PANELS = (  # column, topic, title, limits
     ("delivery_before", "map", "maps delivered, no split", (-0.03, 1.03)),
     ("kB_per_s", "state", "frames of all robots, kB/s, with each hop", (0.0, 500.0)),
 )
-MEDIANS = "medians over seeds with intervals of 95 %, – where half of the runs have no value"
+MEDIANS = "medians with\nintervals of 95 %, – where half of the runs have no value"
 AGE, MAPS = ("age of states, s", ("state", "age_mean_s", ".2f")), ("maps delivered", ("map", "delivery_before", ".2f"))
 STATES = "states delivered", ("state", "delivery_before", ".2f")
 DIFFERENCES = (  # hypothesis, first and second middleware, title, and the topic, column and format
@@ -163,7 +163,7 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
         f"{is_late.sum()} of them since they were late. Of the frames of the runs that count,\n"
         f"{np.median(late_percent):.2f} % were late (median), and {late_percent.max():.2f} % at most.\n"
         f"In the median run UDP's programs sent 99 % of their states at most {_median_ms(counted):.0f} ms late.",
-        f"zenoh closed a transport over a message that it may not drop in {_closings(counted)}.",
+        f"zenoh closed a transport over a message that it may not drop in\n{_closings(counted)}.",
     ]
     steady = {
         "states": ("state", "delivery_before", ".2f"),
