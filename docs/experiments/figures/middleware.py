@@ -158,9 +158,9 @@ def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     failed = table.filter(pl.col("ended") == "failed")
     counted = successes(table)
     is_late, late_percent = failed["error"].cast(pl.String).str.starts_with("late"), 100.0 * counted["late"].to_numpy()
+    failures = f" {len(failed)} failed,\n{is_late.sum()} of them since they were late." if len(failed) else ""
     lines = [
-        f"{len(counted)} runs count, {_seeds(counted)} seeds of each point. {len(failed)} failed,\n"
-        f"{is_late.sum()} of them since they were late. Of the frames of the runs that count,\n"
+        f"{len(counted)} runs count, {_seeds(counted)} seeds of each point.{failures} Of the frames of these runs,\n"
         f"{np.median(late_percent):.2f} % were late (median), and {late_percent.max():.2f} % at most.\n"
         f"In the median run UDP's programs sent 99 % of their states at most {_median_ms(counted):.0f} ms late.",
         f"zenoh closed a transport over a message that it may not drop in\n{_closings(counted)}.",
