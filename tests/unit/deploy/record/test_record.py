@@ -199,7 +199,7 @@ def test_repeat_without_or_with_changed_live_events_is_refused(tmp_path):
         simulation.run()
     path = tmp_path / "run" / LIVE_EVENTS
     path.write_text(path.read_text().replace("flock-1", "nobody"))
-    with pytest.raises(BadInput, match="event 0 .*robots.names: "):
+    with pytest.raises(BadInput, match="event 0: robots.names: "):
         repeat(tmp_path / "run")
     path.unlink()
     with pytest.raises(BadInput, match=LIVE_EVENTS):
