@@ -23,6 +23,7 @@ from swarmwire.deploy.robots.fleet_file import read_fleet
 from swarmwire.deploy.robots.host_side.messages import HostFacts
 from swarmwire.deploy.robots.host_side.system import facts
 from swarmwire.deploy.robots.packages import LockedEnvironments, RobotPlatform
+from swarmwire.deploy.robots.result import SILENT
 from tests.support.deploy.fleet.fleets import AGENT
 from tests.support.deploy.fleet.hosts import SSHD, new_key, write_key
 
@@ -109,7 +110,7 @@ def _measure(kind: str, hosts: int, environments: LockedEnvironments, deployment
 def _deployed(fleet: Fleet, environments: LockedEnvironments) -> float:
     began_ns = WallClock().now_ns()
     contents = release_contents(fleet, fleet.robots)
-    results = asyncio.run(deploy(fleet, fleet.robots, contents.entries, environments))
+    results = asyncio.run(deploy(fleet, fleet.robots, contents.entries, environments, SILENT))
     took_s = to_s(WallClock().now_ns() - began_ns)
     bad = [
         *map(str, contents.faults.values()),
