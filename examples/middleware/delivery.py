@@ -205,11 +205,14 @@ def _finite(time_s: float) -> float | None:
 
 
 def sent_late_p99_ms(run: Path) -> float:
-    """Return how late programs sent states, the 99th percentile over a run: behind their earliest one."""
+    """Return the 99th percentile of how late programs sent states, behind their earliest one.
+
+    States that a program could not send count as in time.
+    """
     late_ms: list[FloatArray] = []
-    for folder in (run / "programs").iterdir():
-        sent = _records(folder / "sent.bin") if folder.is_dir() else ()
-        sent_ms = np.array([record["sent_ns"] for record in sent if record["kind"] == TOPICS["state"]]) / MS
+    for path in (run / "programs").glob("*/sent.bin"):
+        sent = _records(path)
+        sent_ms = sent["sent_ns"][sent["kind"] == TOPICS["state"]] / MS
         after_plan_ms = sent_ms - STATE_PERIOD_MS * np.arange(len(sent_ms))
         late_ms.append(after_plan_ms - after_plan_ms.min(initial=np.inf))
     return float(np.percentile(np.concatenate(late_ms), 99))

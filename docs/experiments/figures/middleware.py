@@ -12,7 +12,7 @@ from scipy import stats
 
 from examples.middleware.delivery import radio_use, read_logs, results, sent_late_p99_ms
 from examples.middleware.node import START_S, TRANSPORTS
-from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, SOFT, plain_axes
+from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, plain_axes
 from swarmwire.metrics.pictures.report.page import blank_figure
 
 CAMPAIGN = "middleware"
@@ -22,7 +22,7 @@ COLUMNS = ()  # `digested` chooses
 NAME, LOSS = "robots.team.program.3", "radio.loss"
 CLOSING = "Unable to push non droppable network message"  # zenoh then closes the transport (H6)
 MAX_BEGIN_S = START_S + 1.0  # a run whose programs begin later does not count
-COLORS = {0.0: CURVE, 0.2: ACCENT, 0.4: SOFT}
+COLORS = {0.0: CURVE, 0.2: ACCENT}
 LIMIT_S = 20.0  # from the end of the split to that of a run
 PANELS = (  # column, topic, title, limits
     ("delivery_before", "state", "states delivered, no split", (-0.03, 1.03)),
@@ -84,17 +84,13 @@ class Median(NamedTuple):
     def from_values(cls, values: pl.Series) -> "Median":
         """Return the median of values, a missing one being greater than any other.
 
-        The interval is from the r-th smallest to the r-th greatest value, with the greatest r for which fewer than r of
-        n fair coins show heads in at most 2.5 % of all cases (H. A. David, Order Statistics, 2.3).
+        The interval is that of `scipy.stats.quantile_test`, which assumes nothing about the distribution.
         """
         ordered = np.sort(values.fill_null(np.inf).to_numpy().astype(np.float64))
-        count = len(ordered)
-        if not count:
+        if not len(ordered):
             return cls(np.nan, np.nan, np.nan)
-        rank = int(stats.binom.ppf(0.025, count, 0.5))
-        low, high = (ordered[rank - 1], ordered[count - rank]) if rank else (np.nan, np.nan)
-        middle = ordered[(count - 1) // 2], ordered[count // 2]
-        return cls(float(np.mean(middle)), float(low), float(high))
+        low, high = stats.quantile_test(ordered, p=0.5).confidence_interval(0.95)
+        return cls(float(np.median(ordered)), float(low), float(high))
 
     def text(self, form: str) -> str:
         """Return value and interval, each as a dash if it is missing."""
@@ -116,11 +112,11 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
         row, side = divmod(index, 2)
         axes = plain_axes(figure, (0.13 + 0.49 * side, 0.775 - 0.24 * row, 0.36, 0.17), title)
         axes.grid(visible=False, axis="y")
-        for place_index, loss in enumerate(losses):
+        for loss_index, loss in enumerate(losses):
             for y, name in enumerate(names):
                 is_here = (pl.col(NAME) == name) & (pl.col(LOSS) == loss)
                 values = successes(table, topic).filter(is_here)[column].to_list()
-                _draw_values(axes, y + 0.3 * (place_index - 0.5), values, COLORS[loss], limits)
+                _draw_values(axes, y + 0.3 * (loss_index - 0.5), values, COLORS[loss], limits)
         axes.set_yticks(range(len(names)), names, fontsize=SMALL_PT)
         axes.set_ylim(len(names) - 0.4, -0.6)
         if limits is not None:
@@ -129,10 +125,8 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
             axes.set_xscale("log")
             axes.xaxis.set_major_formatter("{x:g}")
             axes.xaxis.set_minor_formatter("")
-    for place_index, loss in enumerate(losses):
-        figure.text(
-            0.4 + 0.15 * place_index, 0.985, f"● loss {loss:g}", color=COLORS[loss], fontsize=SMALL_PT, va="top"
-        )
+    for loss_index, loss in enumerate(losses):
+        figure.text(0.4 + 0.15 * loss_index, 0.985, f"● loss {loss:g}", color=COLORS[loss], fontsize=SMALL_PT, va="top")
     return figure
 
 
