@@ -94,20 +94,21 @@ def messages_of(
 
 
 def read_logs(run: Path) -> Logs:
-    """Read the logs of a run of `two-rooms.toml`."""
+    """Read the logs of a run of `two-rooms.toml` or `convoy.toml`."""
     names: list[str] = json.loads((run / "static.json").read_text())["robot_names"]
     folders = [run / "programs" / name for name in names]
     start_ns = min(int((folder / "started").read_text()) for folder in folders)
     begun_ns = max(int((folder / "begun").read_text()) for folder in folders)
     scenario = tomllib.loads((run / "scenario.toml").read_text())
     split, duration_s = scenario["events"][0], float(scenario["duration_s"])
-    ticks = pl.read_parquet(run / "ticks.parquet", columns=["time_s", "x_m"])
-    x_m = ticks.filter(pl.col("time_s") >= split["at_s"] - 1e-6)["x_m"][0].to_numpy()
+    axis = f"{split['halves']}_m"
+    ticks = pl.read_parquet(run / "ticks.parquet", columns=["time_s", axis])
+    position_m = ticks.filter(pl.col("time_s") >= split["at_s"] - 1e-6)[axis][0].to_numpy()
     received = {robot: _records(folder / "received.bin") for robot, folder in enumerate(folders)}
     sent = np.concatenate([_records(folder / "sent.bin") for folder in folders])
     messages = messages_of(sent, received, start_ns)
     split_s = split["at_s"], split["at_s"] + split["for_s"]
-    return Logs(messages, (begun_ns - start_ns) / S, x_m < 0.0, split_s, duration_s)
+    return Logs(messages, (begun_ns - start_ns) / S, position_m < 0.0, split_s, duration_s)
 
 
 def _records(path: Path) -> np.ndarray[Any, Any]:

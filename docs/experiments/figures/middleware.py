@@ -2,7 +2,7 @@
 
 # pyright: basic, reportUnknownMemberType=false
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 from scipy import stats
 
+from docs.experiments.figures._side_by_side import table as markdown
 from examples.middleware.delivery import radio_use, read_logs, results, sent_late_p99_ms
 from examples.middleware.node import START_S, TRANSPORTS
 from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SMALL_PT, plain_axes
@@ -55,8 +56,9 @@ DIFFERENCES = (  # hypothesis, first and second middleware, title, and the topic
 def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
     """Return a row per run and topic, and one with topic null for each run that failed, in the order of programs."""
     rows: list[dict[str, Any]] = []
+    parameters = [name for name in (NAME, LOSS) if name in runs.columns]
     for run in runs.iter_rows(named=True):
-        begin = {key: run[key] for key in (NAME, LOSS, "seed", "ended", "error")}
+        begin = {key: run[key] for key in (*parameters, "seed", "ended", "error")}
         if run["ended"] == "failed":
             rows.append(begin)
             continue
@@ -70,7 +72,7 @@ def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
         use["closings"] = sum(log.read_text(errors="replace").count(CLOSING) for log in path.glob("programs/*.log"))
         rows += [begin | row | use for row in results(logs)]
     order = pl.col(NAME).replace_strict({name: index for index, name in enumerate(TRANSPORTS)}, return_dtype=pl.Int64)
-    return pl.DataFrame(rows, infer_schema_length=None).sort(order, LOSS, "seed", "topic", nulls_last=True)
+    return pl.DataFrame(rows, infer_schema_length=None).sort(order, *parameters[1:], "seed", "topic", nulls_last=True)
 
 
 class Median(NamedTuple):
@@ -103,6 +105,14 @@ def successes(runs: pl.DataFrame, topic: str = "state") -> pl.DataFrame:
     return runs.filter(pl.col("topic") == topic)
 
 
+def measured(runs: pl.DataFrame, topic: str, column: str) -> pl.Series:
+    """Return a column of a topic's rows; without those where nobody was cut off, or nobody sent."""
+    rows = successes(runs, topic)
+    if column.startswith("recovery"):
+        rows = rows.filter(pl.col("cut_pairs") > 0)
+    return rows[column].drop_nulls() if column.startswith("delivery") else rows[column]
+
+
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     """Draw a panel per measure: a dot per seed, and their median with its interval."""
     table = runs[CAMPAIGN]
@@ -115,7 +125,7 @@ def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
         for loss_index, loss in enumerate(losses):
             for y, name in enumerate(names):
                 is_here = (pl.col(NAME) == name) & (pl.col(LOSS) == loss)
-                values = successes(table, topic).filter(is_here)[column].to_list()
+                values = measured(table.filter(is_here), topic, column).to_list()
                 _draw_values(axes, y + 0.3 * (loss_index - 0.5), values, COLORS[loss], limits)
         axes.set_yticks(range(len(names)), names, fontsize=SMALL_PT)
         axes.set_ylim(len(names) - 0.4, -0.6)
@@ -149,13 +159,9 @@ def _draw_values(
 def numbers(runs: Mapping[str, pl.DataFrame]) -> str:
     """Return a table of the steady time, one of discovery and the split, and one of cost; medians over seeds."""
     table = runs[CAMPAIGN]
-    failed = table.filter(pl.col("ended") == "failed")
     counted = successes(table)
-    is_late, late_percent = failed["error"].cast(pl.String).str.starts_with("late"), 100.0 * counted["late"].to_numpy()
-    failures = f" {len(failed)} failed,\n{is_late.sum()} of them since they were late." if len(failed) else ""
     lines = [
-        f"{len(counted)} runs count, {_seeds(counted)} seeds of each point.{failures} Of the frames of these runs,\n"
-        f"{np.median(late_percent):.2f} % were late (median), and {late_percent.max():.2f} % at most.\n"
+        f"{counts(table, (NAME, LOSS))}\n"
         f"In the median run UDP's programs sent 99 % of their states at most {_median_ms(counted):.0f} ms late.",
         f"zenoh closed a transport over a message that it may not drop in\n{_closings(counted)}.",
     ]
@@ -207,25 +213,25 @@ def _median_ms(counted: pl.DataFrame) -> float:
 def _closings(counted: pl.DataFrame) -> str:
     """Return in how many runs of each mode zenoh closed a transport (H6)."""
     modes = counted.filter(pl.col(NAME).str.starts_with("zenoh")).group_by(NAME, maintain_order=True)
-    counts = modes.agg((pl.col("closings") > 0).sum().alias("runs"), pl.len().alias("all"))
-    return ", ".join(f"{runs} of {total} runs of {name}" for name, runs, total in counts.iter_rows())
+    closings = modes.agg((pl.col("closings") > 0).sum().alias("runs"), pl.len().alias("all"))
+    return ", ".join(f"{runs} of {total} runs of {name}" for name, runs, total in closings.iter_rows())
 
 
 def _table(table: pl.DataFrame, columns: Mapping[str, tuple[str, str, str]]) -> str:
     table = table.with_columns((pl.col("discovered") / pl.col("pairs")).alias("reach"))
-    rows = [["middleware", "loss", "seeds", *columns], ["---"] * (3 + len(columns))]
+    rows: list[list[str]] = []
     for (name, loss), group in successes(table).group_by(NAME, LOSS, maintain_order=True):
         point = table.filter((pl.col(NAME) == name) & (pl.col(LOSS) == loss))
         cells = [
-            Median.from_values(successes(point, topic)[column]).text(form) for topic, column, form in columns.values()
+            Median.from_values(measured(point, topic, column)).text(form) for topic, column, form in columns.values()
         ]
         rows.append([str(name), f"{loss:g}", str(len(group)), *cells])
-    return _markdown(rows)
+    return markdown(["middleware", "loss", "seeds", *columns], rows)
 
 
 def _pairs(table: pl.DataFrame) -> str:
     """Return a table of the differences that the hypotheses are about."""
-    rows = [["hypothesis", "difference", "loss", "seeds", "first is greater in", "median"], ["---"] * 6]
+    rows: list[list[str]] = []
     for hypothesis, first, second, title, (topic, column, form) in DIFFERENCES:
         pairs = successes(table, topic).filter(pl.col(NAME) == first)
         others = successes(table, topic).filter(pl.col(NAME) == second)
@@ -236,14 +242,18 @@ def _pairs(table: pl.DataFrame) -> str:
             greater = str((group["difference"] > 0).sum())
             median = Median.from_values(group["difference"]).text(form)
             rows.append([hypothesis, f"{first} - {second}, {title}", f"{loss:g}", str(len(group)), greater, median])
-    return _markdown(rows)
+    return markdown(["hypothesis", "difference", "loss", "seeds", "first is greater in", "median"], rows)
 
 
-def _markdown(rows: list[list[str]]) -> str:
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
-
-
-def _seeds(counted: pl.DataFrame) -> str:
-    counts = counted.group_by(NAME, LOSS).len()["len"]
-    low, high = counts.min(), counts.max()
-    return f"{low}" if low == high else f"{low} to {high}"
+def counts(table: pl.DataFrame, keys: Sequence[str]) -> str:
+    """Return how many runs count, of each point as `keys` tell them apart, why others do not, and the late frames."""
+    failed, counted = table.filter(pl.col("ended") == "failed"), successes(table)
+    seeds = counted.group_by(keys).len()["len"]
+    low, high = seeds.min(), seeds.max()
+    is_late, late_percent = failed["error"].cast(pl.String).str.starts_with("late"), 100.0 * counted["late"].to_numpy()
+    failures = f" {len(failed)} failed,\n{is_late.sum()} of them since they were late." if len(failed) else ""
+    return (
+        f"{len(counted)} runs count, {low if low == high else f'{low} to {high}'} seeds of each point.{failures} "
+        f"Of the frames of these runs,\n{np.median(late_percent):.2f} % were late (median), and "
+        f"{late_percent.max():.2f} % at most."
+    )

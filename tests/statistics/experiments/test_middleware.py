@@ -17,6 +17,7 @@ STATE = {
     "discovered": 28,
     "discovery_p50_s": 1.0,
     "discovery_max_s": 2.0,
+    "cut_pairs": 30,
     "recovery_p50_s": None,
     "recovery_max_s": None,
     "delivery_before": 0.5,
@@ -74,3 +75,18 @@ def test_numbers_pair_runs_with_the_same_seed():
         for seed, age_s in enumerate(ages_s)
     ]
     assert "| H1 | zenoh-peer - dds, age of states, s | 0 | 3 | 2 | 0.50 |" in numbers_of(rows)
+
+
+def test_numbers_of_conditions_leave_out_recovery_where_nobody_was_cut_off():
+    def campaign(*rows):
+        return pl.DataFrame([BEGIN | STATE | row for row in rows], infer_schema_length=None)
+
+    experiment = find_experiment("middleware-conditions", LAYOUT)
+    runs = {name: campaign({"seed": 1}) for name in experiment.campaigns}
+    runs["middleware-4"] = campaign(
+        *({"seed": seed, "recovery_p50_s": at_s, "cut_pairs": cut} for seed, at_s, cut in ((1, 2.0, 6), (2, None, 0)))
+    )
+    text = experiment.numbers(runs)
+    (row,) = [line for line in text.splitlines() if line.startswith("| robots 4 | udp |")]
+    assert " 2.0 " in row
+    assert "| 2 |" in row

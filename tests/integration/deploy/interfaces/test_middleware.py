@@ -1,7 +1,5 @@
 """Each middleware between three robots of the experiment: state, map and commands arrive."""
 
-import sys
-
 import pytest
 
 from examples.middleware.delivery import read_logs, results
@@ -26,7 +24,6 @@ SHORT = {
 def test_robots_receive_state_map_and_commands(tmp_path, monkeypatch, name):
     if name in PACKAGES:
         pytest.importorskip(PACKAGES[name], reason="needs the group middleware")
-    monkeypatch.setenv("PYTHON", sys.executable)
     monkeypatch.setenv("START_S", "4")
     options = [f"--set={path}={value}" for path, value in {**SHORT, "robots.team.program.3": name}.items()]
     scenario = ROOT / "examples" / "middleware" / "two-rooms.toml"

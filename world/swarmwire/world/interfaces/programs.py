@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,7 +103,12 @@ class Programs:
                 stdout=log,
                 stderr=log,
                 cwd=program.working_folder,
-                env={**os.environ, **_environment(robot, name, program.addresses, scratch), **self._gateway(robot)},
+                env={
+                    "PYTHON": sys.executable,  # python3 on the path may be another one, without the packages of this
+                    **os.environ,
+                    **_environment(robot, name, program.addresses, scratch),
+                    **self._gateway(robot),
+                },
                 start_new_session=True,
             )
 
