@@ -35,12 +35,12 @@ CONDITIONS = (
     Condition("robots", "4", "middleware-4"),
     Condition("robots", "8", "middleware", 0.0),
 )
-PANELS = (  # column, topic, title, limits, whether its axis is logarithmic
-    ("delivery_before", "state", "states delivered, no split", (-0.03, 1.03), False),
-    ("age_mean_s", "state", "mean age of states, s, no split", None, True),
-    ("discovery_p50_s", "state", "discovery, median pair, s", (-0.5, 12.5), False),
-    ("recovery_p50_s", "state", "recovery after the split, median pair, s", (-0.5, 20.5), False),
-    ("kB_per_s", "state", "frames of all robots, kB/s, with each hop", (0.0, None), False),
+PANELS = (  # column, topic, title, and limits; without them the axis is logarithmic
+    ("delivery_before", "state", "states delivered, no split", (-0.03, 1.03)),
+    ("age_mean_s", "state", "mean age of states, s, no split", None),
+    ("discovery_p50_s", "state", "discovery, median pair, s", (-0.3, 6.5)),
+    ("recovery_p50_s", "state", "recovery after the split, median pair, s", (-0.5, 20.5)),
+    ("kB_per_s", "state", "frames of all robots, kB/s, with each hop", (0.0, None)),
 )
 COLORS = ("#222222", "#2f6fae", "#7fb2e5", "#c2502e", "#e59a7f", "#8c1c13", "#4f8a3c")  # by middleware
 STEP = 0.11  # between middlewares at a condition, whose distance is 1
@@ -62,29 +62,25 @@ MEASURES = {
 
 def draw(runs: Mapping[str, pl.DataFrame]) -> Any:
     """Draw a panel per measure: medians with their intervals, by middleware and condition."""
-    figure = blank_figure(7.2, 8.2)
-    for row, (column, topic, title, limits, is_log) in enumerate(PANELS):
+    figure, positions = blank_figure(7.2, 8.2), list(_positions())
+    for row, (column, topic, title, limits) in enumerate(PANELS):
         axes = plain_axes(figure, (0.07, 0.79 - 0.187 * row, 0.91, 0.135), title)
         axes.grid(visible=False, axis="x")
         last = limits[1] if limits else None
-        for x, condition in _positions():
+        for x, condition in positions:
             table = _rows(runs, condition)
             for index, name in enumerate(TRANSPORTS):
                 values = measured(table.filter(pl.col(NAME) == name), topic, column)
                 _draw_median(axes, x + STEP * (index - 3), Median.from_values(values), COLORS[index], last)
-        axes.set_xticks(
-            [x for x, _ in _positions()],
-            [condition.value for _, condition in _positions()],
-            fontsize=SMALL_PT,
-        )
-        if is_log:
+        axes.set_xticks([x for x, _ in positions], [condition.value for _, condition in positions], fontsize=SMALL_PT)
+        if limits is not None:
+            axes.set_ylim(*limits)
+        else:
             axes.set_yscale("log")
             axes.yaxis.set_major_formatter("{x:g}")
             axes.yaxis.set_minor_formatter("")
-        else:
-            axes.set_ylim(*limits)
     for axis in dict.fromkeys(condition.axis for condition in CONDITIONS):
-        middle = np.mean([x for x, condition in _positions() if condition.axis == axis])
+        middle = np.mean([x for x, condition in positions if condition.axis == axis])
         axes.annotate(
             axis, (middle, 0), (0, -20), xycoords=("data", "axes fraction"), textcoords="offset points",
             ha="center", va="top", fontsize=SMALL_PT, color=SOFT,
