@@ -56,7 +56,8 @@ class SweepOptions:
         typer.Option(help="Worker processes, of a cluster at most. Default: one for each core; all."),
     ] = None
     batch: Annotated[
-        int | None, typer.Option(help="Arenas in one world at most; 1: none together. Default: about 50.")
+        int | None,
+        typer.Option(help="Arenas in one world at most; 1: none together. Default: up to 250, fewer of long runs."),
     ] = None
     series: Annotated[bool, typer.Option(help="Keep the metrics of each tick.")] = True
     record_seeds: Annotated[
