@@ -2,8 +2,8 @@
 
 A file is a fenced block below the comment `<!-- file: name -->`. Commands are the lines that start with "$ " in a
 `console` block; each line below one, up to the next, must be matched by a line that it prints, in this order, where "…"
-stands for anything. Commands that cannot run here (viewers, make) stand in `text` blocks. Those below the comment
-`<!-- needs: module -->` run where the module is installed.
+stands for anything. Commands that cannot run here (viewers, make) stand in `text` or `sh` blocks; the words of ours are
+checked. Those below the comment `<!-- needs: module -->` run where the module is installed.
 """
 
 import re

@@ -1,4 +1,7 @@
-"""Every command on every page runs as it stands there, one after the other, and prints what the page shows."""
+"""Every command on every page runs as it stands there, one after the other, and prints what the page shows.
+
+Of a command that cannot run here the words are checked.
+"""
 
 import os
 import re
@@ -9,14 +12,19 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.core import TyperGroup
 
+from swarmwire.agent.cli import _parser as agent_parser
 from swarmwire.deploy import run
+from swarmwire.deploy.cli.app import load_command
 from tests.docs.pages import PAGES, ROOT, Command, blocks_of, commands_of, files_of, first_not_printed
 from tests.support.deploy.runs import called
 
 WITH_COMMANDS = [page for page in PAGES if commands_of(page)]
 SHOWN = ("docs/getting-started.md", "docs/scenario.md", "docs/api/deploy.md")
 IN_THIS_PROCESS = re.compile(r"swarmwire (?!sweep|tune|test)[^|&;>*]*")  # workers need a main module
+BY_ROOT = "$(command -v swarmwire)"  # behind sudo
+OURS = re.compile(r"\b(swarmwire(?:-agent)?) +(?=[a-z])(.*?)(?= && |$)")
 
 
 @pytest.fixture
@@ -52,6 +60,29 @@ def test_commands_run_and_print_what_is_shown(page, project, monkeypatch, capsys
         assert code == 0, f"{command.line}\n{text}"
         missing = first_not_printed(command, text)
         assert missing is None, f"{command.line}\nshown, but not printed: {missing}\n{text}"
+
+
+def commands_not_run() -> list[tuple[str, str, str]]:
+    """The commands of ours in blocks that nothing runs: page, program and its arguments."""
+    blocks = [(page, block.text) for page in PAGES for kind in ("text", "sh") for block in blocks_of(page, kind)]
+    joined = [(page, text.replace("\\\n", " ").replace(BY_ROOT, "swarmwire")) for page, text in blocks]
+    lines = [(page, line.partition(" # ")[0]) for page, text in joined for line in text.splitlines()]
+    return [(page, match[1], match[2]) for page, line in lines if (match := OURS.search(line))]
+
+
+@pytest.mark.parametrize(("page", "program", "arguments"), commands_not_run())
+def test_command_that_nothing_runs_exists_with_its_options(page, program, arguments):
+    words = shlex.split(arguments)
+    if program == "swarmwire-agent":  # xargs adds the file
+        agent_parser().parse_args([*words, "robot.toml"] if words[-1] == "--config" else words)
+        return
+    name, *words = words
+    command = load_command(name)
+    while isinstance(command, TyperGroup):
+        context = command.make_context(name, list(words))
+        name, words = words[len(words) - len(context.args) - 1], context.args  # behind the options of the group
+        command = command.commands[name]
+    command.make_context(name, list(words))
 
 
 def test_pages_with_commands_include_those_checked_for_output():

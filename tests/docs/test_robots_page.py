@@ -1,9 +1,7 @@
-"""The page about real robots: what it does without one happens, and all that needs one can be typed as it stands."""
+"""The page about real robots: what it does without one happens."""
 
-import argparse
 import os
 import re
-import shlex
 import signal
 import subprocess
 import sys
@@ -11,26 +9,21 @@ from collections.abc import Generator, Sequence
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
-import click
 import pytest
-from typer.main import get_command
 
-from swarmwire.agent.cli import _parser as agent_parser
 from swarmwire.agent.radios.tracker import Tracker
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.wire.access_control import access_of
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
-from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
 from swarmwire.deploy.robots.certificates.register import certificate_request
-from tests.docs.pages import ROOT, blocks_of
+from tests.docs.pages import ROOT
 from tests.support.clocks import until
 
 PAGE = "docs/robots.md"
 TRIED = re.compile(r"^<!-- try: (\w+) -->\n```text\n(.*?)\n```$", re.DOTALL | re.MULTILINE)
-OURS = re.compile(r"^(?:.*\| xargs .*)?\b(swarmwire(?:-agent)?) (.*)$")
 ROBOTS = ("flock-0", "flock-1")
 
 
@@ -132,28 +125,3 @@ def test_pose_feed_beyond_this_machine_needs_certificates_or_insecure():
     done = fed("tcp/192.0.2.1:7557")
     assert done.returncode == 2
     assert done.stderr.endswith("reaches beyond this machine; expected --certs, or --insecure\n")
-
-
-def typed() -> list[tuple[str, list[str]]]:
-    """All commands of ours in blocks that nothing runs: which program, and its arguments."""
-    lines = [line for block in blocks_of(PAGE, "text") for line in block.text.replace("\\\n", " ").splitlines()]
-    matches = [OURS.match(line) for line in lines]
-    assert all(matches), lines
-    return [(match[1], shlex.split(match[2], comments=True)) for match in matches if match]
-
-
-@pytest.mark.parametrize(
-    ("program", "words"), typed(), ids=lambda value: value if isinstance(value, str) else " ".join(value)
-)
-def test_commands_for_robots_are_ones_that_there_are(program: str, words: list[str]):
-    if program == "swarmwire-agent":
-        parser = agent_parser()
-        parsed = parser.parse_args([*words, "robot.toml"] if words[-1] == "--config" else words, argparse.Namespace())
-        assert parsed.command == words[0]
-        return
-    command = get_command(app)
-    context = command.make_context("swarmwire", list(words))
-    while isinstance(command, click.Group):
-        name, command, words = command.resolve_command(context, words)
-        assert command
-        context = command.make_context(name, list(words), parent=context)
