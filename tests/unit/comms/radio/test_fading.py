@@ -1,5 +1,7 @@
 """Shadowing and fading of links."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -45,10 +47,15 @@ ARENAS = 3000
 DELTA_M = 5.0
 UNIT = Shadowing(deviation_db=1.0, correlation_m=DELTA_M)
 KEYS = np.array([derive_key("shadowing", arena) for arena in range(ARENAS)], np.uint64)
-SHADOW_WAVES = field_waves(KEYS, UNIT)
 AMPLITUDE_DB = amplitude_db(UNIT)
 SLOW = 64  # a power of two, as sums go by halves
 COORDINATES = st.floats(-200.0, 200.0)
+
+
+@cache  # not as the file is imported: every worker would compile it then
+def shadow_waves() -> np.ndarray:
+    """The waves of every arena."""
+    return field_waves(KEYS, UNIT)
 
 
 def rayleigh_gain(key: np.uint64, a: int, b: int, per_m: float, *ends: float) -> float:
@@ -211,7 +218,7 @@ def test_gamma_quantile_has_the_ends_of_its_range():
 
 def over_arenas(*link: float) -> np.ndarray:
     """X of one link (ax, ay, bx, by) in every arena."""
-    return np.array([shadowing_db(waves, AMPLITUDE_DB, *link) for waves in SHADOW_WAVES])
+    return np.array([shadowing_db(waves, AMPLITUDE_DB, *link) for waves in shadow_waves()])
 
 
 def covariance(first: tuple[float, ...], other: tuple[float, ...], steps: int = 400) -> float:
@@ -269,10 +276,10 @@ def test_shadowing_is_the_integral_of_waves_along_the_link(link: tuple[float, ..
     length_m = np.hypot(bx - ax, by - ay)
     nodes, weights = np.polynomial.legendre.leggauss(400)
     share = 0.5 * (nodes + 1.0)[:, None]
-    for kx, ky, phase in SHADOW_WAVES[:3, :, :SLOW]:
+    for kx, ky, phase in shadow_waves()[:3, :, :SLOW]:
         p = np.cos(2.0 * np.pi * (kx * (ax + share * (bx - ax)) + ky * (ay + share * (by - ay)) + phase)).sum(axis=1)
         integral = 0.5 * length_m * (weights @ p) * AMPLITUDE_DB
-        waves = np.zeros(SHADOW_WAVES.shape[1:])
+        waves = np.zeros(shadow_waves().shape[1:])
         waves[2] = 0.25  # the others are 0 everywhere
         waves[:, :SLOW] = kx, ky, phase
         value = shadowing_db(waves, AMPLITUDE_DB, *link)
@@ -281,7 +288,7 @@ def test_shadowing_is_the_integral_of_waves_along_the_link(link: tuple[float, ..
 
 def test_shadowing_counts_each_wave_once():
     """`between_db` has its waves written out: one that it left out or took twice would show as it stands alone."""
-    count = SHADOW_WAVES.shape[2]
+    count = shadow_waves().shape[2]
     alone = np.array([0.05, 0.02, 0.1])[:, None] * np.eye(count)[:, None, :]  # (which, 3, waves)
     value = np.array([shadowing_db(waves, AMPLITUDE_DB, -3.0, 1.0, 2.0, 0.5) for waves in alone])
     assert value[0] != 0.0
@@ -290,7 +297,7 @@ def test_shadowing_counts_each_wave_once():
 
 def test_shadowing_wave_numbers_are_stratified_quantiles():
     """F(k) = 1 - 1 / sqrt(1 + (2 pi delta k)^2) for the exponential covariance of scale delta."""
-    k = np.hypot(SHADOW_WAVES[:50, 0], SHADOW_WAVES[:50, 1])
+    k = np.hypot(shadow_waves()[:50, 0], shadow_waves()[:50, 1])
     share = 1.0 - 1.0 / np.sqrt(1.0 + (2.0 * np.pi * DELTA_M * k) ** 2)
     count = k.shape[1]
     assert np.all(np.abs(share * count - np.arange(count) - 0.5) <= 0.5 + 1e-9)
@@ -307,7 +314,7 @@ def test_shadowing_of_a_single_arena_has_the_expected_variance():
     """Links of 10 m strewn over 100 m x 100 m: about 60 independent patches, so a deviation of about a sixth."""
     draws = np.random.default_rng(4)
     ratios = []
-    for waves in SHADOW_WAVES[:20]:
+    for waves in shadow_waves()[:20]:
         start, turn = draws.uniform(-50, 50, (300, 2)), draws.uniform(0, 2 * np.pi, 300)
         end = start + 10.0 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
         x = [shadowing_db(waves, AMPLITUDE_DB, *a, *b) for a, b in zip(start, end, strict=True)]
@@ -318,19 +325,21 @@ def test_shadowing_of_a_single_arena_has_the_expected_variance():
 
 @given(COORDINATES, COORDINATES, COORDINATES, COORDINATES)
 def test_shadowing_is_equal_in_both_directions(ax: float, ay: float, bx: float, by: float):
-    forth, back = (shadowing_db(SHADOW_WAVES[0], AMPLITUDE_DB, *ends) for ends in ((ax, ay, bx, by), (bx, by, ax, ay)))
+    forth, back = (
+        shadowing_db(shadow_waves()[0], AMPLITUDE_DB, *ends) for ends in ((ax, ay, bx, by), (bx, by, ax, ay))
+    )
     assert forth == back
 
 
 def test_shadowing_of_touching_robots_is_zero():
-    assert shadowing_db(SHADOW_WAVES[0], AMPLITUDE_DB, 3.0, 4.0, 3.0, 4.0) == 0.0
+    assert shadowing_db(shadow_waves()[0], AMPLITUDE_DB, 3.0, 4.0, 3.0, 4.0) == 0.0
     assert over_arenas(3.0, 4.0, 3.0, 4.001).std() < 0.02
 
 
 def test_shadowing_field_depends_on_the_arena_key_alone():
     alone = field_waves(KEYS[7:8], UNIT)[0]
-    assert np.array_equal(alone, SHADOW_WAVES[7])
-    assert not np.array_equal(SHADOW_WAVES[7], SHADOW_WAVES[8])
+    assert np.array_equal(alone, shadow_waves()[7])
+    assert not np.array_equal(shadow_waves()[7], shadow_waves()[8])
 
 
 def test_shadowing_scales_with_deviation_and_correlation_length():
@@ -338,7 +347,7 @@ def test_shadowing_scales_with_deviation_and_correlation_length():
     larger = Shadowing(2.0, 10.0 * DELTA_M)
     waves = field_waves(KEYS[:1], larger)[0]
     doubled = shadowing_db(waves, amplitude_db(larger), 10.0, 20.0, -70.0, 30.0)
-    assert doubled == pytest.approx(2.0 * shadowing_db(SHADOW_WAVES[0], AMPLITUDE_DB, 1.0, 2.0, -7.0, 3.0), rel=1e-6)
+    assert doubled == pytest.approx(2.0 * shadowing_db(shadow_waves()[0], AMPLITUDE_DB, 1.0, 2.0, -7.0, 3.0), rel=1e-6)
 
 
 @given(st.floats(-1e4, 1e4))

@@ -2,6 +2,7 @@
 
 import math
 from decimal import Decimal, getcontext
+from functools import cache
 
 import numpy as np
 import pytest
@@ -50,8 +51,12 @@ CYLINDER = Obstacle("cylinder", 0.0, 0.0, radius_m=1.0)
 BOX = Obstacle("box", 5.0, 0.0, size_m=(2.0, 4.0))
 TURNED = Obstacle("box", -4.0, 3.0, heading_rad=0.6, size_m=(1.0, 3.0))
 SIZE_M = (16.0, 16.0)
-ARENAS = indexed(((CYLINDER, BOX, TURNED), (), (BOX, BOX)), SIZE_M)
 COORDINATES = st.floats(-8.0, 8.0)
+
+
+@cache  # not as the file is imported: every worker would compile it then
+def walls() -> ObstacleIndex:
+    return indexed(((CYLINDER, BOX, TURNED), (), (BOX, BOX)), SIZE_M)
 
 
 def friis_db(distance_m: float, frequency_hz: float) -> Decimal:
@@ -220,37 +225,37 @@ def through(obstacles: ObstacleIndex, *line: float, arena: int = 0) -> tuple[int
     ],
 )
 def test_wall_chords_are_exact(line: tuple[float, ...], crossed: int, inside_m: float):
-    count, length_m = through(ARENAS, *line)
+    count, length_m = through(walls(), *line)
     assert count == crossed
     assert length_m == pytest.approx(inside_m, rel=1e-12, abs=1e-12)
 
 
 def test_wall_loss_counts_obstacles_and_metres_of_its_arena_and_overlaps_twice():
-    loss = wall_loss_db(ARENAS, np.empty((5, 2)), 0, 5.0, 3.0, -2.0, 0.0, 0.0, 8.0, 0.0, 0.0)
+    loss = wall_loss_db(walls(), np.empty((5, 2)), 0, 5.0, 3.0, -2.0, 0.0, 0.0, 8.0, 0.0, 0.0)
     assert loss == pytest.approx(2 * 5.0 + 4.0 * 3.0, rel=1e-12)
-    assert through(ARENAS, -2.0, 0.0, 8.0, 0.0, arena=1) == (0, 0.0)
-    assert through(ARENAS, -2.0, 0.0, 8.0, 0.0, arena=2) == (2, pytest.approx(4.0, rel=1e-12))
+    assert through(walls(), -2.0, 0.0, 8.0, 0.0, arena=1) == (0, 0.0)
+    assert through(walls(), -2.0, 0.0, 8.0, 0.0, arena=2) == (2, pytest.approx(4.0, rel=1e-12))
 
 
 @given(COORDINATES, COORDINATES, COORDINATES, COORDINATES)
 def test_wall_chords_are_equal_in_both_directions(ax: float, ay: float, bx: float, by: float):
-    assert through(ARENAS, ax, ay, bx, by) == through(ARENAS, bx, by, ax, ay)
+    assert through(walls(), ax, ay, bx, by) == through(walls(), bx, by, ax, ay)
 
 
 @given(COORDINATES, COORDINATES, COORDINATES, COORDINATES, st.floats(0.0, 1.0))
 def test_wall_chords_of_parts_add_up(ax: float, ay: float, bx: float, by: float, share: float):
     mx, my = ax + share * (bx - ax), ay + share * (by - ay)
-    parts_m = through(ARENAS, ax, ay, mx, my)[1] + through(ARENAS, mx, my, bx, by)[1]
+    parts_m = through(walls(), ax, ay, mx, my)[1] + through(walls(), mx, my, bx, by)[1]
     # A point in the middle is off the line by rounding; a chord that grazes a circle changes by the root of that.
-    assert parts_m == pytest.approx(through(ARENAS, ax, ay, bx, by)[1], abs=1e-6)
+    assert parts_m == pytest.approx(through(walls(), ax, ay, bx, by)[1], abs=1e-6)
 
 
 @given(COORDINATES, COORDINATES, COORDINATES, COORDINATES)
 def test_line_with_a_wall_chord_is_blocked(ax: float, ay: float, bx: float, by: float):
-    crossed, inside_m = through(ARENAS, ax, ay, bx, by)
+    crossed, inside_m = through(walls(), ax, ay, bx, by)
     assert inside_m <= math.hypot(bx - ax, by - ay) + 1e-12
     assume(inside_m == 0.0 or inside_m > 1e-9)  # `is_blocked` has other roundings
-    assert not crossed or is_blocked_on_floor(ARENAS, 0, ax, ay, bx, by)
+    assert not crossed or is_blocked_on_floor(walls(), 0, ax, ay, bx, by)
 
 
 @given(COORDINATES, COORDINATES, COORDINATES, COORDINATES, st.floats(-math.pi, math.pi), COORDINATES, COORDINATES)
