@@ -6,6 +6,7 @@ from pkgutil import iter_modules
 from typing import Any
 
 import numpy as np
+from hypothesis import settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray, KeyArray
@@ -83,6 +84,8 @@ WIFI_N = replace(
 )
 ALL_MEASURES = Measures(RangeMeasure(0.1), BearingMeasure(0.1), RssiMeasure(0.5))
 METHODS = ("none", "aloha", "csma-802154", "dcf")
+# No scenario has bursts over 802.11n: `make test` does not compile its events for them, which takes ten seconds.
+HAS_MANY_EXAMPLES = settings().max_examples > 20
 
 
 @dataclass
@@ -308,6 +311,7 @@ def signal_radios(draw: st.DrawFn) -> Radio:
     radio = draw(st.sampled_from([*map(with_access, METHODS), WIFI_N]))
     slow = radio.frame == "plain" and draw(st.booleans())
     walls = draw(st.sampled_from([None, Walls(9.0)]))
+    may_have_bursts = radio.frame != "802.11n" or HAS_MANY_EXAMPLES
     return replace(
         radio,
         bit_rate_bps=draw(st.sampled_from([900, 30_000])) if slow else radio.bit_rate_bps,
@@ -319,7 +323,7 @@ def signal_radios(draw: st.DrawFn) -> Radio:
         jitter_s=draw(st.sampled_from([0.0, 0.3])),
         shadowing=draw(st.sampled_from([None, Shadowing(6.0, 2.0)])),
         fading=draw(st.sampled_from([None, Fading()])),
-        bursts=draw(st.sampled_from([None, Bursts(0.1, 0.2)])),
+        bursts=draw(st.sampled_from([None, Bursts(0.1, 0.2)] if may_have_bursts else [None])),
         bodies=draw(st.sampled_from([None, Bodies()])),
         walls=walls,
         line_of_sight=walls is None and draw(st.booleans()),
