@@ -2,7 +2,8 @@
 
 import json
 import re
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass, replace
+from functools import cache
 from io import StringIO
 from typing import Any, get_args, get_type_hints
 
@@ -21,6 +22,7 @@ from swarmwire.comms.robot.bodies.drives import DRIVES, Leds
 from swarmwire.comms.robot.bodies.ros2_names import Ros2Names
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.comms.robot.sensors import SENSOR_SPECS
+from swarmwire.deploy.cli.catalogue import kinds
 from swarmwire.deploy.cli.catalogue.kinds import KINDS, find, print_entry, print_list
 from swarmwire.deploy.cli.catalogue.schema import CatalogueEntry, unit_of
 from swarmwire.metrics.measures.registry import METRICS
@@ -109,7 +111,14 @@ def test_list_has_a_plain_line_for_each_entry_of_a_registry(kind):
     assert all(line == line.rstrip() and line.isprintable() for line in lines)
 
 
+@pytest.fixture
+def kinds_once(monkeypatch):
+    """Entries are made once, not for each name that is looked up."""
+    monkeypatch.setattr(kinds, "KINDS", tuple(replace(kind, entries=cache(kind.entries)) for kind in KINDS))
+
+
 @OF_EACH_KIND
+@pytest.mark.usefixtures("kinds_once")
 def test_entry_is_found_by_name_and_printed_with_every_parameter(kind):
     entries = kind.entries()
     for entry in entries[:: 1 + len(entries) // 60]:  # of hundreds of keys, some
@@ -140,6 +149,7 @@ def test_entry_of_a_class_describes_each_of_its_fields(name):
 
 
 @pytest.mark.parametrize("name", behaviours.__all__)
+@pytest.mark.usefixtures("kinds_once")
 def test_behaviour_entry_shows_needs_and_parameters(name):
     kind, text = getattr(behaviours, name), printed(find(name))
     assert ", ".join(kind.needs) in text
