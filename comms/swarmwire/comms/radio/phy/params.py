@@ -1,5 +1,6 @@
 """Parameters of the PHY's event simulation, derived once from the radio and the standards' timing."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from swarmwire.comms.radio.config.frames import (
     eifs_acknowledgement_ns,
     range_rate_bps,
 )
-from swarmwire.comms.radio.config.phy import METHODS
+from swarmwire.comms.radio.config.phy import METHODS, Reception
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.phy.duty_cycle import allowance_ns
 from swarmwire.comms.radio.phy.ht.params import HT_RATES_BPS, HtParams, ht_params_of
@@ -144,12 +145,19 @@ def phy_params_of(radio: Radio, robots: int, spreading: Spreading | None = None)
         cw_min=dcf.cw_min,
         cw_max=dcf.cw_max,
         receiver=receiver,
-        log_success=np.array([log_success_table(receiver_of(reception, rate_bps)) for rate_bps in rates_bps]),
+        log_success=np.array([_log_success_at(reception, rate_bps) for rate_bps in rates_bps]),
         data_rate=rates_bps.index(range_rate_bps(radio)),
         broadcast_rate=rates_bps.index(broadcast_bps),
         ack_rate=rates_bps.index(ack_rate_bps),
         ht=ht_params_of(radio) if is_ht else None,
     )
+
+
+@lru_cache(maxsize=32)  # a table takes 4 ms, and most radios have the same bit rate several times
+def _log_success_at(reception: Reception, rate_bps: int) -> FloatArray:
+    table = log_success_table(receiver_of(reception, rate_bps))
+    table.setflags(write=False)
+    return table
 
 
 def thresholds_of(radio: Radio, params: PhyParams) -> Thresholds:
