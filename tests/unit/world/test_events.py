@@ -406,6 +406,21 @@ def test_battery_at_a_failure_rate_may_fail_again_after_revival():
     assert (later & first).any()
 
 
+def test_battery_failures_of_two_events_kill_until_both_have_ended():
+    conditions, crowd = ActiveEffects(ROBOTS), swarm(7)
+    first, second = fail("battery", per_hour=60.0, for_s=20.0), fail("battery", per_hour=60.0, for_s=35.0)
+    first.begin(0, crowd, conditions)
+    second.begin(1, crowd, conditions)
+    for time_s in 10.0 + 5.0 * np.arange(1, 61):
+        first.advance(0, to_ns(time_s), crowd, conditions)
+        second.advance(1, to_ns(time_s), crowd, conditions)
+        assert (conditions.alive == ~conditions.failed("battery")).all()
+    assert (conditions.failures[0].failed & conditions.failures[1].failed).any()
+    still_failed = conditions.failures[1].failed.copy()
+    first.end(0, conditions)
+    assert (conditions.alive == ~still_failed).all()
+
+
 def test_battery_gauge_works_after_revival():
     conditions, crowd = ActiveEffects(4), swarm(7, robots=4)
     fail("battery").begin(0, crowd, conditions)

@@ -117,7 +117,8 @@ class Fail(LastingEvent):
         after = effects.failed(self.part)
         failed, recovered = after & ~before, before & ~after
         if self.part == BATTERY:
-            effects.kills[serial] = effects.kills[serial] & ~recovered | failed
+            # Of this event alone, whatever other events do to the same batteries: each kill ends with its failure.
+            effects.kills[serial] = effects.failures[serial].failed.copy()
         return failed, recovered
 
     def _lifetimes(self, serial: int, swarm: Swarm) -> Lifetimes:
