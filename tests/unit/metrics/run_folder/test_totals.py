@@ -201,6 +201,13 @@ def test_distance_counts_of_receptions_too_late_are_unknown(monkeypatch):
     assert [seen_by(static(2), *[nothing] * ticks, late).unknown for ticks in (2, 3)] == [0, 1]
 
 
+def test_distance_counts_of_packets_on_air_for_too_long_are_unknown_also_if_all_are_lost(monkeypatch):
+    monkeypatch.setattr(distances, "POSES_S", 0.2)
+    nothing = {"departed": departed([]), "finished": links([], [], 0, 0)}
+    lost = {"departed": departed([0], intended=2), "finished": links([0], [1], 0, 0, fate=Fate.LOST)}
+    assert [seen_by(static(3), *[nothing] * ticks, lost).unknown for ticks in (2, 3)] == [0, 2]
+
+
 @pytest.mark.parametrize("pairs_per_tick", [10**6, 10, 3])
 @settings(max_examples=15)
 @given(run=radio_runs())

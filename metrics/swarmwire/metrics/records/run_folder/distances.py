@@ -100,8 +100,8 @@ class DistanceCounts(Totals):
         every: number of packets per counted packet.
         intended: (arenas, bins) intended receivers.
         received: (arenas, bins) receivers that received.
-        unknown: receivers that received but are missing in `received`, since their packet was under way for too long;
-            if there are any, the ratio is unknown.
+        unknown: intended receivers and receptions that are missing in both, since their packet was on air or under
+            way for too long; if there are any, the ratio is unknown.
     """
 
     def __init__(self, static: Static) -> None:
@@ -157,9 +157,11 @@ class DistanceCounts(Totals):
         ticks = geometry_tick(departed.on_air_at_ns[counted], self._static.rate_hz)
         robots = np.arange(self._static.robots)
         for tick in np.unique(ticks).tolist():
+            rows = counted[ticks == tick]
             if tick not in self._positions:
+                self.unknown += int(departed.intended[rows].sum())
                 continue
-            positions, rows = self._positions[tick], counted[ticks == tick]
+            positions = self._positions[tick]
             arena, sender, to = departed.arena[rows, None], departed.sender[rows, None], departed.to[rows, None]
             is_intended = np.where(to == BROADCAST, positions.alive[arena[:, 0]], robots == to) & (robots != sender)
             self._count(self.intended, arena, positions.apart_m(arena, sender, robots), is_intended)
