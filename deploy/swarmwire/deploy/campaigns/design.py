@@ -172,10 +172,11 @@ def toml_value(value: object) -> str:
         return str(value)  # inf, -inf, nan
     if isinstance(value, Mapping):
         table = cast("Mapping[str, object]", value)
-        return "{" + ", ".join(f"{json.dumps(key)} = {toml_value(item)}" for key, item in table.items()) + "}"
+        return "{" + ", ".join(f"{toml_value(key)} = {toml_value(item)}" for key, item in table.items()) + "}"
     if isinstance(value, Sequence) and not isinstance(value, str):
         return "[" + ", ".join(toml_value(item) for item in cast("Sequence[object]", value)) + "]"
-    return json.dumps(value)
+    # JSON escapes characters beyond 16 bits as two, which TOML refuses; DEL is the one that TOML needs escaped.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def points_of(

@@ -1,12 +1,14 @@
 """What varies, the points of designs, and campaigns, which are checked at the door at each of their points."""
 
+import tomllib
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.deploy.campaigns.design import ParameterRange, points_of, vary_from, vary_of
+from swarmwire.deploy.campaigns.design import ParameterRange, points_of, toml_value, vary_from, vary_of
 from swarmwire.deploy.campaigns.spec import SweepSpec, plan_of
 from tests.support.refusals import refused_input
 
@@ -44,6 +46,11 @@ def test_lists_are_toml_values_and_what_is_none_is_a_text():
     assert values('a="x,y",z') == ['"x', 'y"', "z"]
     assert values("robots.pair.agent=a.py:A,b.py:B") == ["a.py:A", "b.py:B"]
     assert values("a=7") == [7]
+
+
+def test_toml_value_is_read_back_whatever_characters_a_text_has():
+    text = 'a "flock" \\ \N{SLIGHTLY SMILING FACE} \x7f\t\u00e9'
+    assert tomllib.loads(f"value = {toml_value({text: [text]})}") == {"value": {text: [text]}}
 
 
 def test_tables_and_lists_of_a_file_say_the_same():
