@@ -53,7 +53,9 @@ class WindowedMetric(Metric):
 
     needs = ("packets",)
 
-    window_s: float = parameter(1.0, help="length of the window; rounded up to whole ticks", unit="s", above=0.0)
+    window_s: float = parameter(
+        1.0, help="length of the window; rounded up to whole ticks", unit="s", above=0.0, at_most=86_400.0
+    )
 
 
 class Window:
