@@ -347,6 +347,16 @@ def test_rows_beyond_those_of_the_run_are_refused_unread(tmp_path, name, most):
     assert f"{most + 1} rows" in finding.text
 
 
+def test_rows_of_robots_that_send_more_packets_than_most_are_read(tmp_path):
+    run, packets = static(2), 1000
+    sent = links([0] * packets, [1] * packets, list(range(packets)), 5)
+    record(tmp_path, run, list(wandering(run, 1, finished=sent)), packets=1.0)
+    (tmp_path / "run.json").write_text(json.dumps({"format": 1, "ticks": 1}))
+    assert RunFolder(tmp_path).packets()["sequence"].to_list() == list(range(packets))
+    (finding,) = (row for row in verify(tmp_path) if row.part == "packets")
+    assert finding.state is TableState.INTACT
+
+
 @pytest.mark.parametrize("claimed", [{"ticks": 10**15}, {}])
 def test_ticks_that_run_json_alone_claims_are_believed_within_limits(tmp_path, monkeypatch, claimed):
     folder = tables_of_a_run(tmp_path, claimed)

@@ -24,7 +24,7 @@ from swarmwire.metrics.records.run_folder.writer import Chunk, ChunkLimit, Table
 OPTIONAL_COLUMNS = ("rssi_dbm", "payload", "payloads")  # columns of `ReceptionRecords` that may be None
 NO_ROWS = ("out_of_range", "in_flight")  # fates that have no row
 CHUNK_ROWS = 100_000
-PACKETS_PER_TICK = 100  # upper bound of a robot's average
+PACKETS_PER_TICK = 100  # of a robot on average, in most runs
 POSES_S = 5.0  # simulated time for which poses are stored; packets under way for longer have no distance
 
 
@@ -43,6 +43,7 @@ class PacketsTable(RecordedTable):
 
     name = "packets"
     may_be_null = ("receiver", "to", "rssi_dbm", "distance_m", "payload")
+    row_bytes = 1.0  # a robot may send any number of packets in a tick; a row takes about 5 bytes
 
     types: ClassVar = {
         "arena": pl.Int32,

@@ -191,7 +191,8 @@ class RunFolder:
         if name not in TABLES:
             return None
         try:
-            return TABLES[name].size_fault(lazy, self.static, self.max_ticks)
+            size_bytes = sum(file.stat().st_size for file in self.files(name))
+            return TABLES[name].size_fault(lazy, self.static, self.max_ticks, size_bytes)
         except BadInput:  # another file is damaged; callers that need it report the fault
             lists = [kind.size for kind in lazy.collect_schema().values() if isinstance(kind, pl.Array)]
             rows, limit = lazy.select(pl.len()).collect().item(), UNPROVEN_ROBOT_TICKS // max([1, *lists])

@@ -1,5 +1,6 @@
 """Interface of a recorded table: schema, recorder and checks. Each table is one file, and one line in `tables.py`."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
@@ -65,6 +66,7 @@ class RecordedTable(ABC):
         types: polars' type of each column, if it is the same in every run.
         may_be_null: columns that may have missing values.
         optional: columns of the schema that a table may lack.
+        row_bytes: least size of a row in a file, in bytes, of a table without an upper bound of its rows.
     """
 
     name: ClassVar[str]
@@ -72,6 +74,7 @@ class RecordedTable(ABC):
     types: ClassVar[dict[str, Any]] = {}
     may_be_null: ClassVar[tuple[str, ...]] = ()
     optional: ClassVar[tuple[str, ...]] = ()
+    row_bytes: ClassVar[float] = math.inf
 
     def schema(self, static: Static | None = None) -> dict[str, Any]:
         """Return the polars type of each column; empty if it depends on the run and `static` is None."""
@@ -83,7 +86,10 @@ class RecordedTable(ABC):
 
     @abstractmethod
     def max_rows(self, static: Static, ticks: int) -> int:
-        """Return the largest number of rows of a run with this many ticks; a table with more rows is not read."""
+        """Return the largest number of rows of a run with this many ticks, or with `row_bytes` of most runs.
+
+        A table with more rows is not read, unless its files are at least as large as `row_bytes` says.
+        """
 
     @abstractmethod
     def compare(self, files: list[Path], summary: Mapping[str, Any] | None) -> Verdict:
@@ -93,12 +99,13 @@ class RecordedTable(ABC):
         """Return the columns that the table has in every run."""
         return self.schema().keys()
 
-    def size_fault(self, table: pl.LazyFrame, static: Static, ticks: int) -> str | None:
-        """Return a wrong type or number of rows, in words; reads only the footers of the files."""
+    def size_fault(self, table: pl.LazyFrame, static: Static, ticks: int, size_bytes: int) -> str | None:
+        """Return a wrong type or number of rows of files of this size, in words; reads only their footers."""
         fault = self.type_fault(table, static)
         if fault is not None:
             return fault
-        rows, limit = table.select(pl.len()).collect().item(), self.max_rows(static, ticks)
+        limit = max(self.max_rows(static, ticks), int(size_bytes / self.row_bytes))
+        rows = table.select(pl.len()).collect().item()
         return f"{rows} rows, of a run that writes {limit} at most" if rows > limit else None
 
     def reach(self, table: pl.LazyFrame) -> str:
