@@ -193,6 +193,8 @@ def points_of(
     for index, vary in enumerate(varied):
         if vary.path in [other.path for other in varied[:index]]:
             raise vary.refused("expected each path once")
+        if replaced := [other.path for other in varied[:index] if other.path.startswith(f"{vary.path}.")]:
+            raise vary.refused(f"expected it before {replaced[0]}, which lies within it: it would replace that value")
     if kind != LIST:
         _refuse_repeated_values(varied)
     if kind in DRAWN:

@@ -90,6 +90,7 @@ def test_grid_combines_all_values_and_varies_the_last_path_fastest():
         {"a": 1, "b": "x"}, {"a": 1, "b": "y"}, {"a": 2, "b": "x"}, {"a": 2, "b": "y"}
     ]  # fmt: skip
     assert points("grid") == [{}]
+    assert points("grid", "a={},{c=1}", "a.b=1") == [{"a": {}, "a.b": 1}, {"a": {"c": 1}, "a.b": 1}]
 
 
 def test_list_design_pairs_values_one_to_one():
@@ -139,6 +140,7 @@ def test_random_draws_are_uniform_also_in_equal_ratios():
         ("gird", ["a=1,2"], None, "design: .*grid"),
         ("grid", ["a=0:1"], None, "--vary a=0:1: expected FIRST:LAST:COUNT"),
         ("grid", ["a=1,2", "a=3"], None, "--vary a=3: .*once"),
+        ("grid", ["a.b=1,2", "a={},{c=1}"], None, "--vary a={},{c=1}: .*before a.b"),
         ("grid", ["a=1,2"], 3, "points: "),
         ("grid", ["n=1:3:9"], None, "--vary n=1:3:9: .*COUNT"),
         ("grid", ["a=1:999:999", "b=1:999:999"], None, "vary: .*100000"),
