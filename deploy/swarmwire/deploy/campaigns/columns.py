@@ -69,6 +69,13 @@ def failed_row(error: str) -> Row:
     return {"ended": FAILED, "error": error}
 
 
+def failure_line(error: str) -> str:
+    """Return the line of a run's error that names the cause: of a traceback the one after the last call."""
+    lines = error.strip().splitlines()
+    calls = [index for index, line in enumerate(lines[:-1]) if line.startswith(" ")]
+    return lines[calls[-1] + 1] if calls else lines[-1]
+
+
 def _radio_columns(radio: RadioResult) -> dict[str, Any]:
     latencies: dict[str, Any] = {}
     for latency in LATENCIES:

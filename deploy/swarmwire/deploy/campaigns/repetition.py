@@ -7,6 +7,7 @@ from typing import Any
 
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
+from swarmwire.deploy.campaigns.columns import failure_line
 from swarmwire.deploy.campaigns.folder import code_changes
 from swarmwire.deploy.campaigns.store import CampaignWriter
 from swarmwire.deploy.runs.config import Recording, Replay, Runners
@@ -223,5 +224,5 @@ class CampaignRun:
         if not len(rows):
             return None, "the campaign has not come to this run"
         if rows["trajectory_sha256"][0] is None:
-            return None, f"the run failed: {rows['error'][0].strip().splitlines()[-1]}"
+            return None, f"the run failed: {failure_line(rows['error'][0])}"
         return (rows["trajectory_sha256"][0],), ""

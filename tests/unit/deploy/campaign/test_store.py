@@ -4,6 +4,7 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.errors import BadInput
+from swarmwire.deploy.campaigns.columns import failure_line
 from swarmwire.deploy.campaigns.store import CampaignWriter, StorageFailed
 from swarmwire.deploy.campaigns.worker import TaskResult
 from swarmwire.metrics.records.campaign.campaign_json import Campaign, Response, write_campaign
@@ -132,3 +133,23 @@ def test_row_of_a_campaign_replaces_a_link_and_leaves_its_target(written):
     written.write(TaskResult((row(3, **{"order.final": None, "found_s": None}),)))
     assert mine.read_text() == "mine"
     assert written.rows()["run"].to_list() == [0, 1, 2, 3]
+
+
+CALLED = 'Traceback (most recent call last):\n  File "near.py", line 9, in step\n    robot.go()\n'
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (f"the agent of a-0 failed:\n{CALLED}ValueError: too near\nin tick 5, at 0.5 s\n", "ValueError: too near"),
+        (
+            f"the agent of a-0 failed:\n{CALLED}AttributeError: go\nRobot has radio\nin tick 5\n",
+            "AttributeError: go",
+        ),
+        (f"the metric east failed:\n{CALLED}KeyError: 'x'\n", "KeyError: 'x'"),
+        ("robots.flock.place: no room for flock-7 with seed 3", "robots.flock.place: no room for flock-7 with seed 3"),
+        ("the worker died\n", "the worker died"),
+    ],
+)
+def test_failure_line_names_the_cause_of_a_failed_run(error, line):
+    assert failure_line(error) == line

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from swarmwire.comms.base.clock import Clock, WallClock, to_s
+from swarmwire.deploy.campaigns.columns import failure_line
 from swarmwire.deploy.campaigns.sweep import Sweep
 from swarmwire.deploy.campaigns.worker import TaskResult
 from swarmwire.metrics.records.campaign.campaign_json import FAILED, FINAL, LINK_PDR, Campaign, Response, value_text
@@ -114,8 +115,10 @@ def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
         console.print(f"… and {len(campaign.points) - MAX_POINTS} more points")
     if sweep.failed:
         failed = next(row for row in campaign.runs.iter_rows(named=True) if row["ended"] == FAILED)
-        why = failed["error"].strip().splitlines()[-1]
-        console.print(f"failed: {sweep.failed} of {sweep.runs} runs, such as run {failed['run']}: {why}", markup=False)
+        cause = failure_line(failed["error"])
+        console.print(
+            f"failed: {sweep.failed} of {sweep.runs} runs, such as run {failed['run']}: {cause}", markup=False
+        )
         console.print(f"if the machine was at fault: {program} sweep --resume {folder} --retry-failed", soft_wrap=True)
         console.print("if the scenario's files were at fault: fix them, then start a new campaign in a new folder")
     console.print(f"written: {folder}", soft_wrap=True)
@@ -125,7 +128,7 @@ def print_sweep(sweep: Sweep, console: Console, program: Path) -> None:
 
 def _table(folder: CampaignFolder) -> Table:
     about, responses = folder.about, _responses(folder)
-    title = f"{about.name}: medians over {len(about.seeds)} seeds"
+    title = f"{about.name}: medians over {counted(len(about.seeds), 'seed')}"
     table = Table(title=Text(title), title_justify="left", title_style="bold")
     for path in folder.parameters:
         table.add_column(Text(path), style="cyan")
