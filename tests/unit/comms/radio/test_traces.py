@@ -111,6 +111,7 @@ def test_trace_links_without_a_value_are_out_of_range_or_modelled():
     assert result.fates() == {"RECEIVED": 8, "LOST": 2, "OUT_OF_RANGE": 20}
     assert result.tally.in_range.sum() == 10
     assert Fate.OUT_OF_RANGE not in result.finished("fate")
+    assert result.departed("out_of_range").sum() == 20
     assert replayed(traces, "model", 5).fates() == {"RECEIVED": 28, "LOST": 2}
 
 

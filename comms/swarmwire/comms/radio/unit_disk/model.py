@@ -113,12 +113,13 @@ def decide(
             if goes_on_air:
                 link = links[np.uint64(i)]
                 i += 1
-                link.packet, link.sender, link.receiver, link.receiver_count = p, s, r, 1
+                # Receivers out of range by a trace are in the row for the remainder, as all others out of range are.
+                link.packet, link.sender, link.receiver, link.receiver_count = p, s, r, fate != OUT_OF_RANGE
+                remaining[p] -= link.receiver_count
                 link.in_range, link.final_at_ns, link.rssi_dbm = is_in_range, at_ns, np.nan
                 link.fate = RECEIVED if fate == UNDER_WAY else fate
                 if fate == UNDER_WAY:
                     after_reception(after, pose, frame, link)
-        remaining[p] -= i - row[p]
     for p in range(used[0]):
         if row[p] != ABSENT:
             packet = packets[p]
