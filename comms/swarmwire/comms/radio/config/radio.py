@@ -59,7 +59,7 @@ class Radio:
 
     range_m: float | None = parameter(
         None,
-        help="greatest distance to receivers, in space, except on measured links; required by the unit disk",
+        help="greatest distance in space to receivers, except on links of measured strength; required by the unit disk",
         unit="m",
         above=0,
     )
