@@ -142,9 +142,10 @@ def test_report_of_a_run_without_a_tick_has_no_figures(tmp_path):
 def test_report_of_a_lone_robot_exists_with_and_without_a_radio(tmp_path, radio):
     run = static(1, radio=radio)
     silent = {"departed": departed([]), "finished": links([], [], 0, 0), "tally": tally({})} if radio else {}
-    report = run_report(run_folder(tmp_path, run, wandering(run, 9, **silent), links=True))
+    report = run_report(run_folder(tmp_path, run, wandering(run, 9, **silent), packets=1.0, links=True))
     assert names(report)[:2] == ["timeline", "trajectories"]
     assert ("no two robots were in range" in texts(report)) == radio
+    assert "--packets all" not in texts(report)  # all tables were recorded
 
 
 def test_names_with_markup_are_escaped_in_a_report(tmp_path):

@@ -194,7 +194,8 @@ def _radio_parts(run: RunData) -> list[Part]:
     drawn = [draw(run) for draw in FIGURES]
     figures = [part for part in drawn if isinstance(part, Figure)]
     missing: list[Part] = [part for part in drawn if isinstance(part, str)]
-    if missing and run.started:
+    needed = run.table("radio_distances"), run.packets(("fate",))
+    if missing and run.started and any(isinstance(table, str) for table in needed):
         folder = shlex.quote(f"{run.folder.path.resolve().name}-again")
         missing.append("A repetition of the same run records the missing tables:")
         missing.append(Listing(f"swarmwire repeat {run.shown_name} --packets all --links --out {folder}"))
