@@ -31,7 +31,7 @@ class FragmentationMetric(Metric):
 
     needs = ("graph",)
 
-    hold_s: float = parameter(1.0, help="a shorter split is no event", unit="s", at_least=0.0, at_most=1e9)
+    hold_s: float = parameter(1.0, help="a shorter split is no event", unit="s", at_least=0.0)
 
     @abstractmethod
     def value(self, events: "Fragmentation", counted: IntArray) -> FloatArray:

@@ -129,7 +129,7 @@ class AggregationTime(ClosePairsMetric):
         choices=("cluster", "hop"),
         help="who is together: all who can be reached by steps of less than the gap, or within one step of one robot",
     )
-    hold_s: float = parameter(0.0, help="for how long", unit="s", at_least=0.0, at_most=1e9)
+    hold_s: float = parameter(0.0, help="for how long", unit="s", at_least=0.0)
 
     name = "aggregation_time_s"
     help = "start of the first stretch in which the largest cluster held a share of the robots alive for long, in s"

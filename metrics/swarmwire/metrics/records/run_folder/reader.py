@@ -141,7 +141,7 @@ class RunFolder:
                 break
             try:
                 lazy = scan_files(files)
-                self._refuse_size(name, lazy)
+                self._refuse_size(name, lazy, files)
                 if arena is not None:
                     lazy = lazy.filter(pl.col("arena") == arena)
                 if rows is not None:
@@ -167,7 +167,7 @@ class RunFolder:
         if not files:
             return None
         lazy = scan_files(files)
-        self._refuse_size(name, lazy)
+        self._refuse_size(name, lazy, files)
         return lazy
 
     @property
@@ -186,20 +186,20 @@ class RunFolder:
         limit = max(digests, UNPROVEN_ROBOT_TICKS // max(1, static.robots * static.arenas))
         return min(claimed, limit) if isinstance(claimed, int) else limit
 
-    def size_fault(self, name: str, lazy: pl.LazyFrame) -> str | None:
-        """Return types or a number of rows that the table of this run cannot have, in words; reads only its schema."""
+    def size_fault(self, name: str, lazy: pl.LazyFrame, files: Sequence[Path]) -> str | None:
+        """Return types or a number of rows that a run's table in `files` cannot have, in words; reads their footers."""
         if name not in TABLES:
             return None
         try:
-            size_bytes = sum(file.stat().st_size for file in self.files(name))
+            size_bytes = sum(file.stat().st_size for file in files)
             return TABLES[name].size_fault(lazy, self.static, self.max_ticks, size_bytes)
         except BadInput:  # another file is damaged; callers that need it report the fault
             lists = [kind.size for kind in lazy.collect_schema().values() if isinstance(kind, pl.Array)]
             rows, limit = lazy.select(pl.len()).collect().item(), UNPROVEN_ROBOT_TICKS // max([1, *lists])
             return f"{rows} rows, more than {limit}, and no {STATIC} that explains them" if rows > limit else None
 
-    def _refuse_size(self, name: str, lazy: pl.LazyFrame) -> None:
-        fault = self.size_fault(name, lazy)
+    def _refuse_size(self, name: str, lazy: pl.LazyFrame, files: Sequence[Path]) -> None:
+        fault = self.size_fault(name, lazy, files)
         if fault is not None:
             raise self._table_error(name, fault)
 

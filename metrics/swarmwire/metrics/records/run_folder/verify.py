@@ -277,7 +277,7 @@ def _file_fault(run: RunFolder, table: RecordedTable, file: Path) -> str | None:
         missing = [column for column in table.columns() if column not in schema]
         if missing:
             return f"no column {missing[0]}"
-        fault = run.size_fault(table.name, pl.scan_parquet(file))
+        fault = run.size_fault(table.name, pl.scan_parquet(file), [file])
         if fault is not None:
             return fault
         for column in schema:
