@@ -6,6 +6,7 @@ from typing import Any
 
 import msgpack
 import numpy as np
+import polars as pl
 import psutil
 import pytest
 
@@ -14,12 +15,14 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.runs import phases
+from swarmwire.deploy.runs.config import Recording
 from swarmwire.deploy.runs.real_time import warm_up
 from swarmwire.deploy.runs.record.inputs import LENGTH_BYTES, WITHIN
 from swarmwire.deploy.runs.scenario_parts import new_medium
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.measures.swarm.order import Speed
 from swarmwire.metrics.records.run_folder.layout import INPUTS
+from swarmwire.metrics.records.run_folder.verify import verify
 from swarmwire.world.scenario_file import load_scenario
 from swarmwire.world.world import World
 from tests.support.deploy.runs import LOSSY, called, processes_of
@@ -107,6 +110,27 @@ def test_packets_cross_between_ticks_fates_add_up_and_the_run_is_the_same_again(
     contradicting(folder)
     with pytest.raises(BadInput, match="packets in the order in which they came"):
         repeat(folder)
+
+
+@pytest.mark.parametrize("stop", ["[]", '[{ metric = "pdr", at_least = 0.0 }]'])
+def test_recorded_packets_include_those_received_within_the_last_tick(tmp_path, stop):
+    overrides = ["duration_s=0.5", f"stop={stop}"]
+    result = run(
+        LOSSY,
+        overrides=overrides,
+        realtime=1,
+        subtick=SUBTICK_S,
+        out=tmp_path,
+        record=Recording(packets=1.0, links=True),
+    )
+    assert result.radio is not None
+    received = pl.col("fate") == "received"
+    packets, links = pl.read_parquet(tmp_path / "packets.parquet"), pl.read_parquet(tmp_path / "radio_links.parquet")
+    robots = pl.read_parquet(tmp_path / "radio_robots.parquet")
+    counts = len(packets.filter(received)), links.filter(received)["packets"].sum(), robots["as_sender_received"].sum()
+    assert counts == (result.radio.fates["received"],) * 3
+    assert counts[0] > 0
+    assert all(finding.good for finding in verify(tmp_path)), verify(tmp_path)
 
 
 def contradicting(folder: Path) -> None:

@@ -233,6 +233,7 @@ class Loop:
         if self.medium:
             if self._subtick:
                 self._subtick.leave(done)
+                self._show_last(self.medium, done)
             counts = self.medium.leave(done)
             self._unseen_of_left = counts if self._unseen_of_left is None else self._unseen_of_left + counts
 
@@ -242,10 +243,19 @@ class Loop:
             return None
         if self._subtick:
             self._subtick.end()
+            self._show_last(self.medium, self._running)
         last = self.medium.end()
         for counts in (self._unseen_of_left, self._unseen):
             last = last if counts is None else last + counts
         return last
+
+    def _show_last(self, medium: RadioMedium, ended: BoolArray) -> None:
+        """Show observers the packets of arenas `ended` (arenas,) that became final in sub-ticks of the last tick."""
+        results = medium.unreported()
+        if results is not None:
+            last = results.in_arenas(ended, self.world.static.robots)
+            for observer in self.observers:
+                observer.see_last(last.departed, last.finished)
 
     @property
     def arena_ticks(self) -> IntArray:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 
 from swarmwire.comms.base.arrays import BoolArray
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.comms.radio.records import PacketCounts
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets, TxStatuses
 from swarmwire.comms.robot.tick_io import Actions, Readings, SparseTable
 
@@ -47,6 +47,9 @@ class Observer:
 
     def see(self, truth: Truth) -> None:
         """Observe a tick; called after each tick. An observer may keep the arrays, but not write to them."""
+
+    def see_last(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
+        """Observe packets of arenas that end that became final within the last tick; no other call shows them."""
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Stop observing; called after the last tick. Return the observer's summary entries.

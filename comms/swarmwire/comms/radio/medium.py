@@ -194,6 +194,11 @@ class RadioMedium:
         self._pass_time(at_ns)
         self._model.set_poses(pose)
 
+    def unreported(self) -> Results | None:
+        """Return what became final by the last `advance` and no step has returned; None: nothing. `end` counts it."""
+        self._collect_final(self._reported_ns)
+        return Results.joined(self._parts) if self._parts else None
+
     def end(self) -> PacketCounts:
         """End the run: packets that are queued or under way end as IN_FLIGHT."""
         self._collect_final(self._reported_ns)

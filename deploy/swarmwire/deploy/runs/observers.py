@@ -12,7 +12,7 @@ from swarmwire.comms.base.clock import Clock, to_ns
 from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import BATTERY_EMPTY, Static, Truth
-from swarmwire.comms.radio.records import PacketCounts
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy.machine import refusal, return_memory
 from swarmwire.metrics.text import abbreviate
@@ -125,6 +125,11 @@ class Guarded(Observer):
         """Show a tick, unless the observer has failed."""
         if not self.has_failed:
             self._try(lambda: self._observer.see(truth))
+
+    def see_last(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
+        """Show the last packets, unless the observer has failed."""
+        if not self.has_failed:
+            self._try(lambda: self._observer.see_last(departed, finished))
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """End the observer; one that has failed may still close its files."""

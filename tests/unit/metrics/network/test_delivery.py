@@ -146,7 +146,7 @@ def test_links_have_what_a_counter_has_however_often_they_are_added_up(waiting, 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(links_table, "MAX_PENDING_ROWS", waiting)
         for one in truths:
-            counts.add(one.finished)
+            counts.add(one.departed, one.finished)
             expected.update(row for row in rows_of(one.finished, "arena", "sender", "receiver", "fate") if row[2] >= 0)
         columns = counts.columns()
     *link, packets = (column.tolist() for column in columns.values())

@@ -126,9 +126,12 @@ class DistanceCounts(Totals):
         x_m, y_m, z_m = (column.reshape(shape) for column in truth.position_m.T)
         self._positions[truth.tick] = RobotPositions(x_m, y_m, z_m, truth.alive.reshape(shape), self._wrap_m)
         self._positions.pop(truth.tick - int(POSES_S * self._static.rate_hz) - 1, None)
-        if truth.departed is not None and truth.finished is not None:
-            self._add_intended(truth.departed)
-            self._add_received(truth.finished)
+        super().see(truth)
+
+    def add(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
+        """Add packets of ticks whose positions are known."""
+        self._add_intended(departed)
+        self._add_received(finished)
 
     def frame(self) -> pl.DataFrame:
         """Return a row per arena and bin, up to the last bin with a receiver."""

@@ -15,7 +15,7 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT, NOWHERE
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.comms.robot.packets import FATE_NAMES
 from swarmwire.metrics.measures.torus import shortest_displacement
 from swarmwire.metrics.records.run_folder.table import RecordedTable, RecordOptions, Verdict, compare_fates
@@ -121,11 +121,14 @@ class PacketRecorder(Observer):
         if not self._positions:
             self._first_tick = truth.tick
         self._positions.append(truth.position_m)
-        if truth.finished is not None and len(truth.finished.sender):
-            self._parts.append(truth.finished)
-            self._rows += len(truth.finished.sender)
+        if truth.finished is not None:
+            self._add(truth.finished)
         if self._limit.reached(self._rows):
             self._write_chunk()
+
+    def see_last(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
+        """Add the last packets."""
+        self._add(finished)
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Write the last chunk and join the parts."""
@@ -136,6 +139,11 @@ class PacketRecorder(Observer):
         return {
             "record_packets": {"rows": self._writer.rows, "dropped": self._writer.dropped, "share": self._share},
         }
+
+    def _add(self, finished: ReceptionRecords) -> None:
+        if len(finished.sender):
+            self._parts.append(finished)
+            self._rows += len(finished.sender)
 
     def _write_chunk(self) -> None:
         if self._parts:

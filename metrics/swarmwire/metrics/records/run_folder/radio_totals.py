@@ -149,8 +149,7 @@ class RobotCounts(Totals):
     def see(self, truth: Truth) -> None:
         """Add the packets of a tick."""
         self._ticks += truth.running
-        if truth.departed is not None and truth.finished is not None:
-            self.add(truth.departed, truth.finished)
+        super().see(truth)
 
     def frame(self) -> pl.DataFrame:
         """Return a row per arena and robot."""
@@ -249,18 +248,13 @@ class LinkCounts(Totals):
         self._pending: list[IntArray] = []
         self._rows = 0
 
-    def see(self, truth: Truth) -> None:
-        """Add the packets of a tick."""
-        if truth.finished is not None:
-            self.add(truth.finished)
-
     def frame(self) -> pl.DataFrame:
         """Return a row per arena, sender, receiver and fate."""
         columns: dict[str, Any] = dict(self.columns())
         columns["fate"] = pl.Series(FATE_NAMES).gather(columns["fate"])
         return pl.DataFrame(columns, schema_overrides=RadioLinks.types)
 
-    def add(self, finished: ReceptionRecords) -> None:
+    def add(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
         """Add packets whose fate is final."""
         rows = np.flatnonzero(finished.receiver != NO_ROBOT)
         link = (finished.arena[rows] * self._robots + finished.sender[rows]) * self._robots + finished.receiver[rows]

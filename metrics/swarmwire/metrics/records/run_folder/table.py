@@ -14,7 +14,7 @@ from swarmwire.comms.base.clock import Clock
 from swarmwire.comms.base.errors import RecordFailed
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
-from swarmwire.comms.radio.records import PacketCounts
+from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.records.run_folder.writer import table_file, write_file
 
@@ -151,9 +151,14 @@ class RecordedTable(ABC):
 class Totals(ABC):
     """Totals over a run, for a table about the radio."""
 
-    @abstractmethod
     def see(self, truth: Truth) -> None:
         """Add a tick."""
+        if truth.departed is not None and truth.finished is not None:
+            self.add(truth.departed, truth.finished)
+
+    @abstractmethod
+    def add(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
+        """Add packets: those that left their senders, and receptions whose fate is final."""
 
     @abstractmethod
     def frame(self) -> pl.DataFrame:
@@ -183,6 +188,10 @@ class TotalsRecorder(Observer):
         if truth.departed is not None and truth.finished is not None:
             self._has_radio = True
         self._totals.see(truth)
+
+    def see_last(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
+        """Add the last packets."""
+        self._totals.add(departed, finished)
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Write the table."""
