@@ -53,6 +53,7 @@ ORDER = (
 IS_COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 LIMITED = PROFILE == "quick" and sys.gettrace() is None and IS_COMPILED
 CPU_S, TOO_SLOW = pytest.StashKey[float](), "too slow"
+COMPILING_LIMIT_S = 300  # the first test that uses a kernel also compiles it: 802.11n for a minute on a core of its own
 STARTS_A_PROCESS = {"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.exec", "os.system"}
 
 _too_slow: list[str] = []
@@ -88,6 +89,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     The process that only hands out tests does not get here, so it starts the workers without waiting for numba.
     """
     items.sort(key=_rank)  # stable
+    for item in filter(_is_unit, items):
+        if item.get_closest_marker("timeout") is None:
+            item.add_marker(pytest.mark.timeout(COMPILING_LIMIT_S))
     platform.processor()  # what a run says of its machine then needs no program
     for module in ("matplotlib.font_manager", "swarmwire.comms.base.kernels"):
         import_module(module)
