@@ -266,6 +266,16 @@ def test_times_and_last_values_are_compared_unless_others_are_named(plain, bette
     ] * 2
 
 
+def test_notes_of_a_comparison_count_the_intervals_by_chance_that_the_table_has(tmp_path, plain, better):
+    def by_chance(comparison):
+        return [line for line in notes(comparison) if "by chance" in line]
+
+    (line,) = by_chance(compared(plain, better, "order"))
+    assert line.startswith("Of 2 intervals about 0.1 ")  # 2 x (1 - 0.95)
+    lone = [write_campaign(tmp_path / name, seeds=(1,)) for name in "ab"]
+    assert by_chance(compared(*lone, "order")) == []
+
+
 def test_response_without_values_is_compared_only_if_named(tmp_path, plain):
     folders = [
         write_campaign(tmp_path / name, numbers=NUMBERS | {"gap_m.final": lambda *_: None}, seeds=(1, 2))

@@ -22,7 +22,7 @@ from swarmwire.metrics.records.campaign.campaign_json import (
 )
 from swarmwire.metrics.records.campaign.folder import PointSelection, point_pairs, shared_paths
 from swarmwire.metrics.statistics.difference import Difference, difference
-from swarmwire.metrics.statistics.sample import LEVEL
+from swarmwire.metrics.statistics.sample import LEVEL, Interval
 from swarmwire.metrics.statistics.summary import SKEWED_SAMPLE, Summary, interval_text, quartiles_text, summary
 from swarmwire.metrics.text import number_text
 
@@ -157,11 +157,11 @@ def _summary(letter: str, summary: Summary) -> dict[str, float]:
 
 def cells(comparison: CampaignComparison, row: ComparisonRow) -> tuple[str, ...]:
     """Return the texts of a row, one for each of COLUMNS."""
-    difference = row.difference
+    difference, interval = row.difference, _shown_interval(row)
     if difference.is_discrete:
-        value_text, interval = f"{number_text(difference.mean, sign=True)} (mean)", difference.mean_interval
+        value_text = f"{number_text(difference.mean, sign=True)} (mean)"
     else:
-        value_text, interval = number_text(difference.median, sign=True), difference.median_interval
+        value_text = number_text(difference.median, sign=True)
     unit = f" [{row.response.unit}]" if row.response.unit else ""
     return (
         row.response.column + unit,
@@ -174,6 +174,10 @@ def cells(comparison: CampaignComparison, row: ComparisonRow) -> tuple[str, ...]
         p_text(difference.p),
         str(difference.pairs) if difference.pairs else f"none ({row.first.n}, {row.second.n})",
     )
+
+
+def _shown_interval(row: ComparisonRow) -> Interval:
+    return row.difference.mean_interval if row.difference.is_discrete else row.difference.median_interval
 
 
 def p_text(p: float) -> str:
@@ -204,9 +208,10 @@ def notes(comparison: CampaignComparison) -> list[str]:
     lines.append(
         "delta (Cliff's): share of pairs of runs in which B is greater, less the share in which A is; -1 to 1."
     )
-    if len(comparison.rows) > 1:
-        chance = len(comparison.rows) * (1.0 - comparison.level)
-        lines.append(f"Of {len(comparison.rows)} rows about {chance:.1g} would leave 0 out of the interval by chance.")
+    intervals = sum(not math.isnan(_shown_interval(row).low) for row in comparison.rows)  # one seed has none
+    if intervals > 1:
+        chance = intervals * (1.0 - comparison.level)
+        lines.append(f"Of {intervals} intervals about {chance:.1g} would leave 0 out by chance.")
     return lines
 
 
