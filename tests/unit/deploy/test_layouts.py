@@ -248,7 +248,8 @@ def states(runners: int | None, seeds: Sequence[int]) -> list[list[str]]:
     """States that robots of a particle swarm note, (ticks, robots)."""
     watcher = Watcher()
     pso = ROOT / "scenarios" / "pso.toml"
-    run_spread(pso, runners, seeds=seeds, overrides=["duration_s=15"], observers=[watcher])
+    often = ["duration_s=4", "robots.particles.params.update_every_ticks=10"]
+    run_spread(pso, runners, seeds=seeds, overrides=often, observers=[watcher])
     return [[truth.states[code] for code in truth.state] for truth in watcher.truths]
 
 
