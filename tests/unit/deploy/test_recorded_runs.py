@@ -7,7 +7,7 @@ from polars.testing import assert_frame_equal
 from typer.testing import CliRunner
 
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.base.errors import BadInput
+from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Recording, RunFolder, run
@@ -166,6 +166,21 @@ def test_jammed_packets_are_counted_for_sender_receiver_and_link(tmp_path):
     assert jammed > 0
     assert robots["as_sender_jammed"].sum() == robots["as_receiver_jammed"].sum() == jammed
     assert links.filter(links["fate"] == "jammed")["packets"].sum() == jammed
+
+
+def test_recorded_packets_include_those_of_a_tick_that_failed(tmp_path):
+    agent = tmp_path / "stating.py"
+    agent.write_text(STATING.replace("robot.drive(", "1 / (robot.time_s < 0.45)\n        robot.drive("))
+    overrides = ["duration_s=2", f"robots.flock.agent={agent}:Stating", "robots.flock.params={}"]
+    record = Recording(packets=1.0, links=True, rrd=False)
+    with pytest.raises(SwarmwireError, match="ZeroDivisionError"):
+        run(LOSSY, overrides=overrides, out=tmp_path / "run", record=record)
+    folder = RunFolder(tmp_path / "run")
+    assert (folder.summary["ended"], folder.summary["ticks"]) == ("failed", 5)
+    received, tables = pl.col("fate") == "received", (folder.packets(), folder.radio_links())
+    counts = len(tables[0].filter(received)), tables[1].filter(received)["packets"].sum()
+    assert counts == (folder.summary["radio"]["fates"]["received"],) * 2
+    assert folder.radio_robots()["as_receiver_received"].sum() == counts[0] > 0
 
 
 def called(*arguments):

@@ -142,8 +142,8 @@ class Loop:
         self._subtick = SubtickRadio(medium, world.static, self._readdress_invalid) if medium and timed else None
         self._invalid_destination = np.zeros(world.static.arenas, np.int64)
         self._without_radio = np.zeros(world.static.arenas, np.int64)
-        # Counts of packets that no observer has seen: of a tick that has not ended, and of arenas that left.
-        self._unseen: PacketCounts | None = None
+        # What no observer has seen: results of a tick that has not ended, and counts of arenas that left.
+        self._unseen: Results | None = None
         self._unseen_of_left: PacketCounts | None = None
         self._hash = TrajectoryHash(world.static.arenas, world.static.robots)
         if not hashes:
@@ -233,7 +233,7 @@ class Loop:
         if self.medium:
             if self._subtick:
                 self._subtick.leave(done)
-                self._show_last(self.medium, done)
+                self._show_last(self.medium.unreported(), done)
             counts = self.medium.leave(done)
             self._unseen_of_left = counts if self._unseen_of_left is None else self._unseen_of_left + counts
 
@@ -241,17 +241,17 @@ class Loop:
         """End the medium, and return the counts of packets in flight and of packets that no observer has seen."""
         if self.medium is None:
             return None
+        self._show_last(self._unseen, self._running)
         if self._subtick:
             self._subtick.end()
-            self._show_last(self.medium, self._running)
+            self._show_last(self.medium.unreported(), self._running)
         last = self.medium.end()
-        for counts in (self._unseen_of_left, self._unseen):
+        for counts in (self._unseen_of_left, self._unseen.tally if self._unseen else None):
             last = last if counts is None else last + counts
         return last
 
-    def _show_last(self, medium: RadioMedium, ended: BoolArray) -> None:
-        """Show observers the packets of arenas `ended` (arenas,) that became final in sub-ticks of the last tick."""
-        results = medium.unreported()
+    def _show_last(self, results: Results | None, ended: BoolArray) -> None:
+        """Show observers the packets of arenas `ended` (arenas,) among results that are in no truth."""
         if results is not None:
             last = results.in_arenas(ended, self.world.static.robots)
             for observer in self.observers:
@@ -292,10 +292,10 @@ class Loop:
             return None, ReceivedPackets.none(), NO_TX_STATUSES
         if self._subtick:
             results, received, tx_status = self._subtick.step(start_ns, pose, effects.disruption, effects.radio)
-            self._unseen = results.tally
+            self._unseen = results
             return results, received, tx_status
         results = self.medium.step(start_ns, pose, effects.disruption, effects.radio)
-        self._unseen = results.tally
+        self._unseen = results
         packets = self._mailbox.pop_packets(tick, results.received, world.alive)
         tx_status = self._mailbox.pop_tx_statuses(tick, results.tx_status, world.alive)
         return results, packets, tx_status

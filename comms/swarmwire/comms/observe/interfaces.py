@@ -49,7 +49,10 @@ class Observer:
         """Observe a tick; called after each tick. An observer may keep the arrays, but not write to them."""
 
     def see_last(self, departed: TransmissionRecords, finished: ReceptionRecords) -> None:
-        """Observe packets of arenas that end that became final within the last tick; no other call shows them."""
+        """Observe the packets of arenas that end whose fates are in no truth.
+
+        They became final within the last tick, or the last tick failed or was interrupted.
+        """
 
     def end(self, last: PacketCounts | None) -> dict[str, Any]:
         """Stop observing; called after the last tick. Return the observer's summary entries.
