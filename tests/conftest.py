@@ -50,8 +50,7 @@ ORDER = (
     "test_",
 )
 # Tracing and Python in place of kernels slow all tests down; the full profile has more examples of each.
-IS_COMPILED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
-LIMITED = PROFILE == "quick" and sys.gettrace() is None and IS_COMPILED
+LIMITED = PROFILE == "quick" and sys.gettrace() is None and os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 CPU_S, TOO_SLOW = pytest.StashKey[float](), "too slow"
 COMPILING_LIMIT_S = 300  # the first test that uses a kernel also compiles it: 802.11n for a minute on a core of its own
 STARTS_A_PROCESS = {"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.exec", "os.system"}

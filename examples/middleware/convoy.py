@@ -36,7 +36,7 @@ def samples(text: str) -> list[tuple[float, int, float, float]]:
         if -0.01 < float(row[0]) - BEGIN_S < DURATION_S + 0.01
         for car in CARS
     ]
-    east_m, north_m = ([value[axis] for value in values] for axis in (2, 3))
+    _, _, east_m, north_m = zip(*values, strict=True)
     middle_east_m, middle_north_m = (min(east_m) + max(east_m)) / 2, (min(north_m) + max(north_m)) / 2
     return [(at_s, car, x_m - middle_east_m, y_m - middle_north_m) for at_s, car, x_m, y_m in values]
 

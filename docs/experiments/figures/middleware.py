@@ -56,9 +56,9 @@ DIFFERENCES = (  # hypothesis, first and second middleware, title, and the topic
 def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
     """Return a row per run and topic, and one with topic null for each run that failed, in the order of programs."""
     rows: list[dict[str, Any]] = []
-    parameters = [name for name in (NAME, LOSS) if name in runs.columns]
+    losses = [LOSS] if LOSS in runs.columns else []  # other campaigns have one
     for run in runs.iter_rows(named=True):
-        begin = {key: run[key] for key in (*parameters, "seed", "ended", "error")}
+        begin = {key: run[key] for key in (NAME, *losses, "seed", "ended", "error")}
         if run["ended"] == "failed":
             rows.append(begin)
             continue
@@ -72,7 +72,7 @@ def digested(folder: Path, runs: pl.DataFrame) -> pl.DataFrame:
         use["closings"] = sum(log.read_text(errors="replace").count(CLOSING) for log in path.glob("programs/*.log"))
         rows += [begin | row | use for row in results(logs)]
     order = pl.col(NAME).replace_strict({name: index for index, name in enumerate(TRANSPORTS)}, return_dtype=pl.Int64)
-    return pl.DataFrame(rows, infer_schema_length=None).sort(order, *parameters[1:], "seed", "topic", nulls_last=True)
+    return pl.DataFrame(rows, infer_schema_length=None).sort(order, *losses, "seed", "topic", nulls_last=True)
 
 
 class Median(NamedTuple):

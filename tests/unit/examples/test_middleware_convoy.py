@@ -1,6 +1,7 @@
 """The motion of cars for the experiment on middleware, from a file of the form in which OpenACC has it."""
 
 import csv
+import hashlib
 
 import pytest
 
@@ -34,7 +35,7 @@ def test_convoy_refuses_a_file_that_is_another_one(tmp_path, monkeypatch):
 def test_convoy_writes_a_table_that_traces_take(tmp_path, monkeypatch):
     monkeypatch.setattr(convoy, "FILE", tmp_path / "convoy.csv")
     data = f"{HEAD}\n550.0,{','.join(f'{car},{2 * car}' for car in range(1, 12))}\n".encode("latin-1")
-    monkeypatch.setattr(convoy, "SHA256", convoy.hashlib.sha256(data).hexdigest())
+    monkeypatch.setattr(convoy, "SHA256", hashlib.sha256(data).hexdigest())
     (tmp_path / "raw.csv").write_bytes(data)
     convoy.main([str(tmp_path / "raw.csv")])
     rows = list(csv.DictReader(convoy.FILE.read_text().splitlines()))
