@@ -176,10 +176,12 @@ def test_recorded_packets_include_those_of_a_tick_that_failed(tmp_path):
     with pytest.raises(SwarmwireError, match="ZeroDivisionError"):
         run(LOSSY, overrides=overrides, out=tmp_path / "run", record=record)
     folder = RunFolder(tmp_path / "run")
-    assert (folder.summary["ended"], folder.summary["ticks"]) == ("failed", 5)
+    summary = folder.summary
+    assert summary is not None
+    assert (summary["ended"], summary["ticks"]) == ("failed", 5)
     received, tables = pl.col("fate") == "received", (folder.packets(), folder.radio_links())
     counts = len(tables[0].filter(received)), tables[1].filter(received)["packets"].sum()
-    assert counts == (folder.summary["radio"]["fates"]["received"],) * 2
+    assert counts == (summary["radio"]["fates"]["received"],) * 2
     assert folder.radio_robots()["as_receiver_received"].sum() == counts[0] > 0
 
 
