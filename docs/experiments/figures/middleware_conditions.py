@@ -16,7 +16,7 @@ from swarmwire.metrics.pictures.report.page import blank_figure
 
 __all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "numbers"]
 
-CAMPAIGNS = ("middleware", "middleware-4")
+CAMPAIGNS = ("middleware", "middleware-4", "middleware-convoy")
 COLUMNS = ()  # `digested` chooses
 
 
@@ -34,6 +34,8 @@ CONDITIONS = (
     Condition("loss", "0.2", "middleware", 0.2),
     Condition("robots", "4", "middleware-4"),
     Condition("robots", "8", "middleware", 0.0),
+    Condition("motion", "walk", "middleware", 0.0),
+    Condition("motion", "convoy", "middleware-convoy"),
 )
 PANELS = (  # column, topic, title, and limits; without them the axis is logarithmic
     ("delivery_before", "state", "states delivered, no split", (-0.03, 1.03)),
