@@ -16,7 +16,7 @@ from swarmwire.metrics.pictures.report.page import blank_figure
 
 __all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "numbers"]
 
-CAMPAIGNS = ("middleware", "middleware-4", "middleware-convoy")
+CAMPAIGNS = ("middleware", "middleware-loss", "middleware-4", "middleware-convoy")
 COLUMNS = ()  # `digested` chooses
 
 
@@ -32,6 +32,7 @@ class Condition(NamedTuple):
 CONDITIONS = (
     Condition("loss", "0", "middleware", 0.0),
     Condition("loss", "0.2", "middleware", 0.2),
+    Condition("loss", "0.4", "middleware-loss"),
     Condition("robots", "4", "middleware-4"),
     Condition("robots", "8", "middleware", 0.0),
     Condition("motion", "walk", "middleware", 0.0),
