@@ -81,7 +81,7 @@ validation: ## compare the radio with ns-3, whose wheel this installs, and write
 	$(RUN) python -m benchmarks.ns3 --page docs/dev/validation.md
 
 .PHONY: soak
-soak: sync ## fuzz every input, then random faults, then an hour of a hundred processes: two hours
+soak: sync ## fuzz every input, then random faults, then an hour of a hundred processes: an hour and a half
 	HYPOTHESIS_PROFILE=soak $(RUN) pytest -q -s tests/integration/test_fuzz.py tests/integration/test_soak.py
 	$(RUN) python -m tests.tools.soak
 
