@@ -38,7 +38,7 @@ ROBOTS = (
     RobotRadio("foot-bot, range and bearing", "argos-rab", "line of sight; 10 bytes; no collisions"),
     RobotRadio("e-puck, range and bearing", "infrared-epuck", "line of sight; 4 bytes; no collisions"),
     RobotRadio("e-puck2, ESP32", "wifi-n-2G", "2.4 GHz at 20 MHz; broadcasts at 6 Mbit/s"),
-    RobotRadio("Kilobot", "kilobot", "9 bytes; neighbours within 0.1 m"),
+    RobotRadio("Kilobot", "kilobot", "9 bytes beside the tag; neighbours within 0.1 m"),
     RobotRadio("Crazyflie", "crazyradio-2M", "32 bytes; a station polls, drones only answer"),
     RobotRadio("TurtleBot, Raspberry Pi", "wifi-n-5G", '`rate_control = "ideal"` adapts the rate to distance'),
     RobotRadio("old Wi-Fi, ad hoc", "wifi-b-1M", "long range at 1 Mbit/s; few robots fill the channel"),

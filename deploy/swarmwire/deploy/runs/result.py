@@ -103,7 +103,7 @@ class Result:
     engine: str  #: engine of the bodies: "discs", "pymunk", "kinematic", or two of them joined by " and "
     runners: int  #: 0: all agents in the world's process
     mode: str  #: "local" | "lockstep" | "realtime"
-    ended: str  #: "duration" | "stopped" (all arenas) | "interrupted" | "left" (by the caller that steps it) | "failed"
+    ended: str  #: "duration" | "stopped" (all arenas) | "interrupted" | "left" (by the caller, or a runner) | "failed"
     error: str | None  #: message of a failed run
     ticks: int  #: number of ticks of the longest arena
     sim_time_s: float

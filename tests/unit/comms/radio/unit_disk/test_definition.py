@@ -1,6 +1,6 @@
 """The unit disk against its definition in plain Python: one packet and one receiver at a time, with short loops.
 
-The rules are those of docs/radio.md and docs/radio.md; keyed draws come from `comms.base.draws`.
+The rules are those of docs/radio.md; keyed draws come from `comms.base.draws`.
 """
 
 from collections import Counter
