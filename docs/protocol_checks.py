@@ -114,7 +114,7 @@ def _numbers(page: _Page) -> Iterator[Comparison]:
     yield "limits", {name: float(value.split()[0]) for name, (value, _) in page.table("limits").items()}, limits
     source = _source(*COUNTERS)
     counted = {f"{fault}_frames" for fault in re.findall(r'BadFrame\("(\w+)"', source)}
-    counted |= set(re.findall(r'"((?:bad|refused)_join|flooded_frames)"', source))
+    counted |= set(re.findall(r'"((?:bad|refused)_join|flooded_(?:frames|requests))"', source))
     yield "counts", set(page.table("counted")), counted
 
 

@@ -1,6 +1,6 @@
 """Avoidance with beacons: one agent file for each robot that has proximity sensors and a radio.
 
-Run it in simulation, from the project's root; `docs/robots.md` runs the same file on emulated robots of four kinds:
+Run it in simulation, from the project's root; `docs/dev/validation.md` has its results on four kinds of robots:
 
     swarmwire run examples/beacons/beacons.toml
 
