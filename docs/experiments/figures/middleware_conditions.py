@@ -16,7 +16,7 @@ from swarmwire.metrics.pictures.report.page import blank_figure
 
 __all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "numbers"]
 
-CAMPAIGNS = ("middleware", "middleware-loss", "middleware-4", "middleware-convoy")
+CAMPAIGNS = ("middleware", "middleware-loss", "middleware-4", "middleware-standing", "middleware-convoy")
 COLUMNS = ()  # `digested` chooses
 
 
@@ -35,6 +35,7 @@ CONDITIONS = (
     Condition("loss", "0.4", "middleware-loss"),
     Condition("robots", "4", "middleware-4"),
     Condition("robots", "8", "middleware", 0.0),
+    Condition("motion", "none", "middleware-standing"),
     Condition("motion", "walk", "middleware", 0.0),
     Condition("motion", "convoy", "middleware-convoy"),
 )
