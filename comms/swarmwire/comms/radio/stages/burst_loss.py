@@ -54,6 +54,7 @@ def bad_after(was_bad, dt_s, a, b, u):
 class BurstParams(NamedTuple):
     """The hash table of link states, and the parameters of the chain, as input of kernels."""
 
+    is_used: bool
     rows: int  # number of robots of all arenas
     symmetric: bool  # True: both directions of a link share a state
     link: IntArray  # (capacity,) one end x rows + the other, or NO_LINK
@@ -64,6 +65,10 @@ class BurstParams(NamedTuple):
     b: float  # rate in 1/s at which bad turns good
     loss_bad: float
     loss_good: float
+
+
+NO_TABLE = np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.bool_), np.zeros(1, np.int64)
+NO_BURSTS = BurstParams(False, 0, False, *NO_TABLE, 0.0, 0.0, 0.0, 0.0)
 
 
 @njit()
@@ -80,7 +85,7 @@ def _slot(links, link):
 @kernel()
 def burst_loss(params, frame):
     """Return BURST by the link's state, which changes with the time since its last frame."""
-    if params is None:
+    if not params.is_used:
         return UNDER_WAY
     a, b = frame.sender, frame.receiver
     if params.symmetric:
@@ -133,7 +138,7 @@ class BurstLoss(FrameLoss):
         a, b = 1.0 / self._bursts.good_s, 1.0 / self._bursts.bad_s
         loss_bad, loss_good = float(self._bursts.loss_bad), float(self._bursts.loss_good)
         table = self._link, self._at_ns, self._bad, self._links
-        return BurstParams(self._rows, self._bursts.symmetric, *table, a, b, loss_bad, loss_good)
+        return BurstParams(True, self._rows, self._bursts.symmetric, *table, a, b, loss_bad, loss_good)
 
     @property
     def passing(self) -> float:

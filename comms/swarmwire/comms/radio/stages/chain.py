@@ -64,7 +64,7 @@ from swarmwire.comms.radio.stages.measurements import (
     to_sender_m,
 )
 from swarmwire.comms.radio.stages.stage import Stage
-from swarmwire.comms.radio.stages.trace import TraceDelay, TraceDelayParams, trace_delay_ns
+from swarmwire.comms.radio.stages.trace import NO_TRACE_DELAY, TraceDelay, TraceDelayParams, trace_delay_ns
 from swarmwire.comms.robot.packets import Fate
 
 BLOCKED = int(Fate.BLOCKED)
@@ -106,7 +106,7 @@ class StagesAfter(NamedTuple):
     """Parameters of the stages after reception."""
 
     params: Table  # one record of type PARAMS
-    trace_delay: TraceDelayParams | None
+    trace_delay: TraceDelayParams
     has_any: bool
 
 
@@ -114,7 +114,7 @@ def stages_after(context: ChannelContext) -> StagesAfter:
     """Return the stages after reception of this medium."""
     stages = [stage for kind in AFTER_RECEPTION if (stage := kind.create(context)) is not None]
     params: Table = np.zeros(1, PARAMS)
-    record, trace_delay = params[0], None
+    record, trace_delay = params[0], NO_TRACE_DELAY
     record.wrap_x_m, record.wrap_y_m = context.wrap_m
     record.needs_distance = any(
         isinstance(stage, MeasuredRange | MeasuredBearing | PropagationDelay) for stage in stages

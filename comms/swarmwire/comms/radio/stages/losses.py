@@ -8,39 +8,39 @@ from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import RECEIVED
-from swarmwire.comms.radio.stages.burst_loss import BurstLoss, BurstParams, burst_loss
+from swarmwire.comms.radio.stages.burst_loss import NO_BURSTS, BurstLoss, BurstParams, burst_loss
 from swarmwire.comms.radio.stages.loss import FixedLoss, FrameLoss, fixed_loss
-from swarmwire.comms.radio.stages.trace import TraceLoss, TraceParams, trace_loss
+from swarmwire.comms.radio.stages.trace import NO_TRACE, TraceLoss, TraceParams, trace_loss
 
-# The order of the tests in a unit disk; a PHY tests those with state last.
+# The order of the tests in a unit disk, see `loss_fate`.
 LOSS_MODELS: tuple[type[FrameLoss], ...] = (FixedLoss, BurstLoss, TraceLoss)
 
 NO_TRACE_NS = -1  # `Losses.trace_ns` of a unit disk, which reads traces at the time of each frame
 
 
 class Losses(NamedTuple):
-    """The losses of a radio as input of kernels, in the order of the tests.
-
-    None: the radio lacks the loss, and its test is not compiled.
-    """
+    """The losses of a radio as input of kernels: one type for all radios, since an event loop compiles for 12 s."""
 
     trace_ns: int  # start of the current poses, see `ReceivedFrame`; or NO_TRACE_NS
     has_any: bool
     fixed: float
-    early_trace: TraceParams | None  # in a PHY
-    burst: BurstParams | None
-    trace: TraceParams | None  # in a unit disk
+    burst: BurstParams
+    trace: TraceParams
 
 
 @kernel()
 def loss_fate(losses: Any, frame: Any):
-    """Return the fate of the first loss that ends the frame, or UNDER_WAY."""
+    """Return the fate of the first loss that ends the frame, or UNDER_WAY.
+
+    Bursts come last in a PHY: they see no frame that another loss ends. A unit disk tests them before the trace.
+    """
+    is_disk = losses.trace_ns == NO_TRACE_NS
     fate = fixed_loss(losses.fixed, frame)
-    if fate == UNDER_WAY:
-        fate = trace_loss(losses.early_trace, frame)
+    if fate == UNDER_WAY and not is_disk:
+        fate = trace_loss(losses.trace, frame)
     if fate == UNDER_WAY:
         fate = burst_loss(losses.burst, frame)
-    if fate == UNDER_WAY:
+    if fate == UNDER_WAY and is_disk:
         fate = trace_loss(losses.trace, frame)
     return fate
 
@@ -88,21 +88,13 @@ class LossChain:
     def losses(self, trace_ns: int, from_ns: int, links: int) -> Losses:
         """Return the input of kernels, for frames at `from_ns` or later on at most `links` links.
 
-        In a PHY the robots have been at their poses since `trace_ns`, and losses with state come last: they see no
-        frame that another loss ends. A unit disk has NO_TRACE_NS.
+        In a PHY the robots have been at their poses since `trace_ns`; a unit disk has NO_TRACE_NS.
         """
         if self._unchanging is not None and self._unchanging.trace_ns == trace_ns:
             return self._unchanging
         params = {type(model): model.params(from_ns, links) for model in self.models}
-        trace, in_disk = params.get(TraceLoss), trace_ns == NO_TRACE_NS
-        losses = Losses(
-            trace_ns,
-            bool(self.models),
-            params.get(FixedLoss, 0.0),
-            None if in_disk else trace,
-            params.get(BurstLoss),
-            trace if in_disk else None,
-        )
+        fixed, burst = params.get(FixedLoss, 0.0), params.get(BurstLoss, NO_BURSTS)
+        losses = Losses(trace_ns, bool(self.models), fixed, burst, params.get(TraceLoss, NO_TRACE))
         self._unchanging = None if self.has_state else losses
         return losses
 

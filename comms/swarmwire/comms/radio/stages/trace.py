@@ -26,16 +26,20 @@ RECEIVED, LOST, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.LOST), int(Fate.OUT_
 class TraceParams(NamedTuple):
     """The measured links of each arena, as input of the kernel."""
 
+    is_used: bool
     robots: int  # robots per arena
     others_end: bool  # True: links without a value are out of range
     ratio: TraceValues  # delivery ratio
     first: TraceValues  # `LinkTraces.first_values`
 
 
+NO_TRACE = TraceParams(False, 0, False, NO_VALUES, NO_VALUES)
+
+
 @kernel()
 def trace_loss(params: Any, frame: Any):
     """Return OUT_OF_RANGE for a link without a value, unless the model serves it; LOST if u >= ratio."""
-    if params is None:
+    if not params.is_used:
         return UNDER_WAY
     link = frame.s * params.robots + frame.r
     if params.others_end and np.isnan(value_at(params.first, link, frame.trace_ns)):
@@ -67,9 +71,8 @@ class TraceLoss(FrameLoss):
     def __init__(self, traces: LinkTraces, others_end: bool, robots: int) -> None:
         self._traces, self._others_end, self._robots = traces, others_end, robots
         ratio = traces.delivery_ratio
-        self._params = TraceParams(
-            robots, others_end, NO_VALUES if ratio is None else ratio.values, traces.first_values
-        )
+        ratios = NO_VALUES if ratio is None else ratio.values
+        self._params = TraceParams(True, robots, others_end, ratios, traces.first_values)
 
     def params(self, from_ns: int, links: int) -> TraceParams:
         """Return the measured values of all times."""
@@ -87,14 +90,18 @@ class TraceLoss(FrameLoss):
 class TraceDelayParams(NamedTuple):
     """The measured delays of each arena, as input of the kernel."""
 
+    is_used: bool
     robots: int  # robots per arena
     delay_s: TraceValues
+
+
+NO_TRACE_DELAY = TraceDelayParams(False, 0, NO_VALUES)
 
 
 @kernel()
 def trace_delay_ns(params: Any, frame: Any, at_ns: int):
     """Return the delay measured on the frame's link at a time, rounded to ns; 0 if none was measured."""
-    if params is None:
+    if not params.is_used:
         return 0
     delay_s = value_at(params.delay_s, frame.s * params.robots + frame.r, at_ns)
     return 0 if np.isnan(delay_s) else np.int64(np.rint(delay_s * NS_PER_S))
@@ -112,4 +119,4 @@ class TraceDelay(Stage):
         return None if context.traces is None else TraceDelay(context.traces.delay_s, context.robots)
 
     def __init__(self, delay_s: LinkTrace | None, robots: int) -> None:
-        self.params = TraceDelayParams(robots, NO_VALUES if delay_s is None else delay_s.values)
+        self.params = NO_TRACE_DELAY if delay_s is None else TraceDelayParams(True, robots, delay_s.values)
