@@ -13,7 +13,7 @@ from typing import Any, cast
 from typer.main import get_command
 
 from docs import robot_radios
-from docs.behaviours.shown import page_of
+from docs.behaviours.shown import PAGES, page_of
 from docs.dependencies import licences
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.cli.catalogue.kinds import kind_named, toml
@@ -115,9 +115,17 @@ def behaviour_table() -> str:
 
 
 def behaviour_details(name: str) -> str:
-    """One behaviour: its needs, docstring and parameters."""
-    entry = next(entry for entry in entries("behaviours") if entry.name == name)
-    return "\n".join([f"Needs: {dict(entry.facts)['needs']}\n", text_of(entry), "", *_tables(entry, set())])
+    """One behaviour: its needs, docstring and parameters; paragraphs of one before it on the page are a link."""
+    named = {_snake(entry.name): entry for entry in entries("behaviours")}
+    entry, members = named[_snake(name)], PAGES[page_of(_snake(name))]
+    paragraphs, links = text_of(entry).split("\n\n"), list[str]()
+    for before in (named[member] for member in members[: members.index(_snake(name))]):
+        new = [paragraph for paragraph in paragraphs if paragraph not in text_of(before).split("\n\n")]
+        if len(new) < len(paragraphs):
+            paragraphs, links = new, [*links, f"[{before.name}](#{before.name.lower()})"]
+    if links:
+        paragraphs.append(f"For the rest see {' and '.join(links)}.")
+    return "\n".join([f"Needs: {dict(entry.facts)['needs']}\n", "\n\n".join(paragraphs), "", *_tables(entry, set())])
 
 
 def _link_to_behaviour(name: str) -> str:
