@@ -21,7 +21,7 @@ USER_ID = 1000
 # What podman gives root in a container by default; docker adds mknod, net_raw and audit_write.
 FILE_CAPABILITIES = ["chown", "dac_override", "fowner", "fsetid", "setfcap"]
 CAPABILITIES = [*FILE_CAPABILITIES, "kill", "setgid", "setuid", "setpcap", "net_bind_service", "sys_chroot"]
-PAGE = ROOT / "docs" / "compiled.md"  # its command for robots with interfaces adds some
+PAGE = ROOT / "docs" / "library.md"  # its command for robots with interfaces adds some
 
 pytestmark = [
     pytest.mark.slow,
