@@ -16,7 +16,10 @@ from swarmwire.metrics.pictures.report.page import blank_figure
 
 __all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "numbers"]
 
-CAMPAIGNS = ("middleware", "middleware-loss", "middleware-4", "middleware-standing", "middleware-convoy")
+CAMPAIGNS = (
+    *("middleware", "middleware-loss", "middleware-4", "middleware-12"),
+    *("middleware-rate", "middleware-standing", "middleware-convoy"),
+)
 COLUMNS = ()  # `digested` chooses
 
 
@@ -35,6 +38,9 @@ CONDITIONS = (
     Condition("loss", "0.4", "middleware-loss"),
     Condition("robots", "4", "middleware-4"),
     Condition("robots", "8", "middleware", 0.0),
+    Condition("robots", "12", "middleware-12"),
+    Condition("bit rate", "fixed", "middleware", 0.0),
+    Condition("bit rate", "adaptive", "middleware-rate"),
     Condition("motion", "none", "middleware-standing"),
     Condition("motion", "walk", "middleware", 0.0),
     Condition("motion", "convoy", "middleware-convoy"),
