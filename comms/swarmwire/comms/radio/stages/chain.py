@@ -20,8 +20,9 @@ To add a loss, a delay or a measurement:
    drop reason is a new `Fate`, with its colour in `FATE_COLORS` (`metrics/pictures/drawing/canvas.py`) and, if every
    receiver has it on a link of its own, an entry in `LINK_FATES` (`metrics/records/run_folder/radio_totals.py`). A new
    measurement is a field of LINK (`links.py`), listed in `Measures.columns`.
-3. List the class, and call the kernel: a loss in `LOSS_MODELS`, `Losses` and `loss_fate` (`losses.py`); another stage
-   in `AFTER_RECEPTION` and `after_reception` below, in its position.
+3. List the class, and call the kernel: a loss in `LOSS_MODELS`, `Losses` and `loss_fate` (`losses.py`), with parameters
+   of the same type for radios that lack it; another stage in `AFTER_RECEPTION` and `after_reception` below, in its
+   position.
 
 A loss that depends on the link (`varies`) has a `delivery`, which the radio graph and the coverage of both models use.
 """
