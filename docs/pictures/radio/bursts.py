@@ -15,7 +15,7 @@ from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.links import RECEIVED
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
 from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
-from swarmwire.comms.radio.stages.losses import NO_TRACE_NS, LossChain, frame_fate
+from swarmwire.comms.radio.stages.losses import AT_FRAME_NS, LossChain, frame_fate
 from swarmwire.metrics.real.radio_fit.losses import expected_runs
 
 BURSTS = Bursts(bad_s=0.5, good_s=2.0)
@@ -54,7 +54,7 @@ def losses(packets: int) -> BoolArray:
     lost = np.empty((links, packets), np.bool_)
     for n in range(packets):
         at_ns = round(n * INTERVAL_S * NS_PER_S)
-        lose(lost[:, n], chain.losses(NO_TRACE_NS, at_ns, links), keys[0], sender, receiver, n, at_ns)
+        lose(lost[:, n], chain.losses(AT_FRAME_NS, at_ns, links), keys[0], sender, receiver, n, at_ns)
     return lost
 
 

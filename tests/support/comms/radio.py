@@ -29,7 +29,7 @@ from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
 from swarmwire.comms.radio.stages.burst_loss import BurstLoss
 from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
-from swarmwire.comms.radio.stages.losses import NO_TRACE_NS, LossChain, frame_fate
+from swarmwire.comms.radio.stages.losses import AT_FRAME_NS, LossChain, frame_fate
 from swarmwire.comms.radio.traces import LinkTrace, LinkTraces, Quantity, link_trace
 from swarmwire.comms.robot.packets import Fate, Payloads, SentPackets
 
@@ -255,7 +255,7 @@ class BurstLinks:
     def lost(self, sender: IntArray, receiver: IntArray, sequence: IntArray, at_ns: IntArray) -> BoolArray:
         """Whether each packet (k,) is lost, between robot rows."""
         first_ns, by_time = int(at_ns.min(initial=2**62)), np.argsort(at_ns, kind="stable")
-        losses = LossChain([self._loss]).losses(NO_TRACE_NS, first_ns, len(sender))
+        losses = LossChain([self._loss]).losses(AT_FRAME_NS, first_ns, len(sender))
         fate = np.empty(len(sender), np.int64)
         fates_of_frames(fate, by_time, losses, self._keys, self._robots, sender, receiver, sequence, at_ns)
         return fate == Fate.BURST

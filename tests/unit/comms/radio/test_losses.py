@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numba import typeof
 from scipy import stats
 
 from swarmwire.comms.base.arrays import FloatArray
@@ -17,7 +18,8 @@ from swarmwire.comms.radio.config.radio import Radio, Trace
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.stages.burst_loss import MIN_CAPACITY, bad_after
-from swarmwire.comms.radio.stages.losses import LOSS_MODELS
+from swarmwire.comms.radio.stages.chain import stages_after
+from swarmwire.comms.radio.stages.losses import AT_FRAME_NS, LOSS_MODELS, LossChain
 from swarmwire.comms.radio.traces import LinkTraces
 from swarmwire.comms.robot.packets import Fate
 from tests.support.comms.radio import (
@@ -89,6 +91,16 @@ def test_loss_models_lose_the_same_frames_in_disk_and_phy(name: str):
     assert received(disk) == received(phy)
     assert disk.fates() == phy.fates()
     assert 100 < disk.fates()["RECEIVED"] < 400
+
+
+@pytest.mark.parametrize("at_ns", [AT_FRAME_NS, 0], ids=["unit disk", "PHY"])
+@pytest.mark.parametrize("name", LOSSES)
+def test_radio_with_a_loss_has_the_types_of_one_without_so_nothing_is_compiled_again(name: str, at_ns: int):
+    def compiled_type(radio: Radio) -> object:
+        context = replace(ChannelContext.open_space(radio, KEYS[:1], TRIO, SIZE_M), traces=RATIOS)
+        return typeof((LossChain.create(context).losses(at_ns, 0, TRIO), stages_after(context)))
+
+    assert compiled_type(replace(DISK, **LOSSES[name])) == compiled_type(DISK)
 
 
 @pytest.mark.parametrize("radio", [DISK, PHY], ids=["unit disk", "PHY"])

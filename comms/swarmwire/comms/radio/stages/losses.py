@@ -15,13 +15,13 @@ from swarmwire.comms.radio.stages.trace import NO_TRACE, TraceLoss, TraceParams,
 # The order of the tests in a unit disk, see `loss_fate`.
 LOSS_MODELS: tuple[type[FrameLoss], ...] = (FixedLoss, BurstLoss, TraceLoss)
 
-NO_TRACE_NS = -1  # `Losses.trace_ns` of a unit disk, which reads traces at the time of each frame
+AT_FRAME_NS = -1  # `Losses.trace_ns` of a unit disk: traces are read at the time of each frame
 
 
 class Losses(NamedTuple):
-    """The losses of a radio as input of kernels: one type for all radios, since an event loop compiles for 12 s."""
+    """The losses of a radio as input of kernels; one type for all radios, so that event loops compile once."""
 
-    trace_ns: int  # start of the current poses, see `ReceivedFrame`; or NO_TRACE_NS
+    trace_ns: int  # start of the current poses, see `ReceivedFrame`; or AT_FRAME_NS
     has_any: bool
     fixed: float
     burst: BurstParams
@@ -34,7 +34,7 @@ def loss_fate(losses: Any, frame: Any):
 
     Bursts come last in a PHY: they see no frame that another loss ends. A unit disk tests them before the trace.
     """
-    is_disk = losses.trace_ns == NO_TRACE_NS
+    is_disk = losses.trace_ns == AT_FRAME_NS
     fate = fixed_loss(losses.fixed, frame)
     if fate == UNDER_WAY and not is_disk:
         fate = trace_loss(losses.trace, frame)
@@ -88,7 +88,7 @@ class LossChain:
     def losses(self, trace_ns: int, from_ns: int, links: int) -> Losses:
         """Return the input of kernels, for frames at `from_ns` or later on at most `links` links.
 
-        In a PHY the robots have been at their poses since `trace_ns`; a unit disk has NO_TRACE_NS.
+        In a PHY the robots have been at their poses since `trace_ns`; a unit disk has AT_FRAME_NS.
         """
         if self._unchanging is not None and self._unchanging.trace_ns == trace_ns:
             return self._unchanging

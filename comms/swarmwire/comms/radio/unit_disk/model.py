@@ -29,7 +29,7 @@ from swarmwire.comms.radio.stages.chain import (
     stages_after,
 )
 from swarmwire.comms.radio.stages.link_draws import ReceivedFrame
-from swarmwire.comms.radio.stages.losses import NO_TRACE_NS, LossChain
+from swarmwire.comms.radio.stages.losses import AT_FRAME_NS, LossChain
 from swarmwire.comms.radio.transmissions import DECIDED, WAITING, Transmissions
 from swarmwire.comms.radio.unit_disk.neighbours import Neighbours, find_neighbours, pairs_in_range
 from swarmwire.comms.radio.unit_disk.tx_queue import TOO_LARGE, TxQueues, leave_queue
@@ -217,7 +217,7 @@ class UnitDisk(RadioModel):
         before = StagesBefore(
             sight and sight.params(pose),
             bodies and bodies.params(pose),
-            self._losses.losses(NO_TRACE_NS, self._now_ns, len(neighbours.other)),
+            self._losses.losses(AT_FRAME_NS, self._now_ns, len(neighbours.other)),
         )
         order = NO_ORDER
         if self._losses.has_state:  # frames of a link are tested in the order of time
