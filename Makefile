@@ -11,7 +11,6 @@ PYTEST := $(RUN) pytest -q -n $(or $(WORKERS),2) --dist worksteal --durations 20
 # zenoh gives up a connection attempt when the other side does not answer in time, which happens when other programs
 # use both cores. Such a test runs once more, and pytest prints "rerun". A wrong value is never tried again.
 RERUNS := --reruns 1 --only-rerun ZError
-WITHOUT_UNIT := $(addprefix tests/,integration statistics docs release) # pytest ignores no folder of `testpaths`
 
 .PHONY: help
 help: ## list the commands
@@ -46,7 +45,7 @@ test: ## lint, all unit tests, and the main uses from end to end: what to run fi
 
 .PHONY: test-all
 test-all: sync ## every test: processes, robots, statistics, docs, installed packages; SLOW=no leaves out the longest, UNIT=no the unit tests
-	HYPOTHESIS_PROFILE=full $(PYTEST) $(RERUNS) $(if $(SLOW),-m "not slow") $(if $(UNIT),$(WITHOUT_UNIT))
+	HYPOTHESIS_PROFILE=full $(PYTEST) $(RERUNS) $(if $(SLOW),-m "not slow") $(if $(UNIT),tests --ignore tests/unit)
 
 .PHONY: check
 check: sync ## lint, format, types, imports between parts, and names

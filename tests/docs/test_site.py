@@ -33,7 +33,7 @@ from swarmwire.world.events import ACTIONS
 from swarmwire.world.scenario_file import scenario_schema
 from tests.docs.pages import ROOT
 
-pytestmark = pytest.mark.timeout(300)  # the build takes 40 s of a free core, and several processes share the cores
+pytestmark = pytest.mark.timeout(600)  # a process may wait for the builds of two others that fail
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def site(tmp_path_factory, testrun_uid) -> Path:
         flock(lock, LOCK_EX)
         if not (folder / "built").exists():
             done = subprocess.run(
-                [*command, ROOT / "docs", folder / "html"], capture_output=True, text=True, check=False, timeout=280
+                [*command, ROOT / "docs", folder / "html"], capture_output=True, text=True, check=False, timeout=180
             )
             assert done.returncode == 0, done.stderr
             assert not done.stderr
