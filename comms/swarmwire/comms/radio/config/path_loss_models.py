@@ -50,13 +50,13 @@ class LogDistance:
     """L(d) = L(1 m) + 10 n log10 d + a d dB (T. S. Rappaport, Wireless Communications, 1996; a: absorption)."""
 
     exponent: float = parameter(
-        3.0, help="n: 2 in free space, 1.6 to 3.5 indoors, 3 to 5 in cities", above=0, at_most=20
+        3.0, help="the exponent n: 2 in free space, 1.6 to 3.5 indoors, 3 to 5 in cities", above=0, at_most=20
     )
     reference_loss_db: float | None = parameter(
         None, help="loss at 1 m; default: that of free space at the radio's frequency", unit="dB"
     )
     absorption_db_per_m: float = parameter(
-        0.0, help="a: absorption in water or leaves per metre", unit="dB/m", at_least=0, at_most=1000
+        0.0, help="the absorption a per metre, as of water or leaves", unit="dB/m", at_least=0, at_most=1000
     )
 
     def curve(self, frequency_hz: float) -> LossCurve:
