@@ -69,7 +69,11 @@ def main(arguments: Sequence[str]) -> int:
         sections = {name: [_quick(each) for each in configurations] for name, configurations in sections.items()}
     every = [each for configurations in sections.values() for each in configurations]
     figures = recorded() if options.recorded else _run(every, Path(options.cache), options.processes)
-    rows = {name: _rows(name, configurations, figures) for name, configurations in sections.items()}
+    our_figures = _run_ours(every, options.processes)
+    rows = {
+        name: [Row.compare(each, figures[each], our_figures[each]) for each in configurations]
+        for name, configurations in sections.items()
+    }
     if options.record and figures:
         write_record(figures, [each for make in SECTIONS.values() for each in make()])
     tables = {name: table(section_rows) for name, section_rows in rows.items()}
@@ -122,9 +126,12 @@ def _first_line(make: Callable[[], list[Configuration]]) -> str:
     return (make.__doc__ or "").partition("\n")[0]
 
 
-def _rows(name: str, configurations: list[Configuration], ns3: dict[Configuration, Figures]) -> list[Row]:
-    shown = track(configurations, f"ours: {name}", console=Console(stderr=True), transient=True)
-    return [Row.compare(each, ns3[each], figures_of(each, ours(each))) for each in shown]
+def _run_ours(configurations: list[Configuration], processes: int) -> dict[Configuration, Figures]:
+    """Return the medium's figures of each."""
+    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
+        begun = pool.map(ours, configurations)
+        shown = track(begun, "ours", len(configurations), console=Console(stderr=True))
+        return {each: figures_of(each, received) for each, received in zip(configurations, shown, strict=True)}
 
 
 def _run(configurations: list[Configuration], cache: Path, processes: int) -> dict[Configuration, Figures]:
