@@ -11,7 +11,7 @@ from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.radio.config.antennas import Antennas
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import ActiveDisruption
-from swarmwire.comms.radio.traces import LinkTraces
+from swarmwire.comms.radio.traces import NO_VALUES, LinkTraces, TraceValues
 
 
 def in_space(pose: FloatArray) -> FloatArray:
@@ -82,3 +82,8 @@ class ChannelContext:
     def wrap_m(self) -> tuple[float, float]:
         """Sides of a torus in m, for `geometry.obstacles.to_nearest`; 0 in arenas with walls."""
         return self.size_m if self.is_torus else (0.0, 0.0)
+
+    @property
+    def measured(self) -> TraceValues:
+        """What was measured on links, as input of kernels."""
+        return NO_VALUES if self.traces is None else self.traces.values

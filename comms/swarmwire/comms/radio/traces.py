@@ -26,6 +26,7 @@ class TraceValues(NamedTuple):
 
 
 NO_VALUES = TraceValues(np.empty(0, np.int64), np.zeros(1, np.int64), np.empty(0, np.int64), np.empty(0))
+RATIO, DELAY, FIRST = range(3)  # quantities in `LinkTraces.values`
 
 
 @kernel()
@@ -159,6 +160,20 @@ class LinkTraces:
             rows = np.searchsorted(link, trace.link)
             time_ns[rows] = np.minimum(time_ns[rows], trace.time_ns[trace.start[:-1]])
         return TraceValues(link, np.arange(len(link) + 1), time_ns, np.ones(len(link)))
+
+    @cached_property
+    def values(self) -> TraceValues:
+        """RATIO, DELAY and FIRST (`first_values`) in one: link i of quantity q is link q x robots x robots + i."""
+        traces = self.delivery_ratio, self.delay_s
+        parts = *(NO_VALUES if trace is None else trace.values for trace in traces), self.first_values
+        robots = max((trace.robots for trace in self.all), default=0)
+        first = np.cumsum([0, *(len(part.value) for part in parts)]).tolist()
+        return TraceValues(
+            np.concatenate([quantity * robots * robots + part.link for quantity, part in enumerate(parts)]),
+            np.concatenate([*(k + part.start[:-1] for k, part in zip(first, parts, strict=False)), first[-1:]]),
+            np.concatenate([part.time_ns for part in parts]),
+            np.concatenate([part.value for part in parts]),
+        )
 
     def has_values(self, sender: IntArray, receiver: IntArray, at_ns: IntArray) -> BoolArray:
         """Return True for each link (k,), indices in the arena, that has a value of any quantity at `at_ns`."""

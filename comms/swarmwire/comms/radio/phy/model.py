@@ -55,7 +55,8 @@ class Reporter:
 
     def tune(self, context: ChannelContext) -> None:
         """Use the radio parameters of `context` from now on."""
-        self._stages, self._spreading = stages_after(context), spreading_of(context.radio, context)
+        self._stages, self._measured = stages_after(context), context.measured
+        self._spreading = spreading_of(context.radio, context)
 
     def report(self, parts: list[ResultBuffer], queued: PacketTable, poses: Poses, liveness: LivenessHistory) -> None:
         """Append packets and links of the result rows in `parts`, which are rows of `queued`."""
@@ -76,10 +77,10 @@ class Reporter:
         new = packets.rows[first_packet:]
         if np.count_nonzero(new["fate"] != UNDER_WAY):
             links.rows["in_range"][first_link + len(pose_id) :] = self._count_in_range(new, liveness)
-        for number, pose in poses.items() if self._stages.has_any else ():
+        for number, pose in poses.items() if self._stages[0].has_any else ():
             index = first_link + np.flatnonzero(pose_id == number)
             if len(index):
-                pass_received(index, links.table, packets.table, pose, self._keys, self._stages)
+                pass_received(index, links.table, packets.table, pose, self._keys, self._stages, self._measured)
 
     def _count_in_range(self, packets: Table, liveness: LivenessHistory) -> IntArray:
         """Return the receivers in range of packets that never went on air, (packets,); 0 for the others."""
@@ -96,7 +97,9 @@ class Reporter:
 
 
 @njit(nogil=True)
-def pass_received(index: AnyArray, links: Any, packets: Any, pose: AnyArray, keys: AnyArray, stages: Any):
+def pass_received(
+    index: AnyArray, links: Any, packets: Any, pose: AnyArray, keys: AnyArray, stages: Any, measured: Any
+):
     """Pass the links of `index` (k,) that were received through the stages that follow reception; in place."""
     robots = len(pose) // len(keys)
     for i in index:
@@ -106,7 +109,7 @@ def pass_received(index: AnyArray, links: Any, packets: Any, pose: AnyArray, key
             arena, at_ns = s // robots, link.final_at_ns
             first_row = arena * robots
             frame = ReceivedFrame(keys[arena], s, r, s - first_row, r - first_row, sequence, 0, False, at_ns, at_ns)
-            after_reception(stages, pose, frame, link)
+            after_reception(stages, measured, pose, frame, link)
 
 
 def _is_intended(queued: Transmissions, rows: ResultBuffer, liveness: LivenessHistory) -> BoolArray:

@@ -58,7 +58,9 @@ def fate_of_frame(ht, params, losses, state, s, i, frame_log_success):
             return JAMMED
         alone = math_compiled.exp(alone_log_success(params, state.link[i].power_mw, sender.bits, sender.rate))
         return COLLIDED if u < alone else TOO_WEAK
-    frame = ReceivedFrame(key, s, receiver, a, b, sequence, attempt, is_ack, sender.on_air_ns, losses.trace_ns)
+    frame = ReceivedFrame(
+        key, s, receiver, a, b, sequence, attempt, is_ack, sender.on_air_ns, losses.params[0].trace_ns
+    )
     return frame_fate(losses, frame)
 
 
@@ -117,7 +119,7 @@ def end_frame(params, losses, state, events, s, now_ns):
         sender.on_air = SILENT
         return
     # Without other losses, a data frame of success 1 is received.
-    is_sure = not losses.has_any and sender.on_air == DATA
+    is_sure = not losses.params[0].has_any and sender.on_air == DATA
     first, weak, stop = np.uint64(sender.first_link), np.uint64(sender.weak_link), np.uint64(sender.stop_link)
     for i in range(first, weak):
         if link[i].fate != UNDER_WAY:

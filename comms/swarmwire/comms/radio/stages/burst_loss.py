@@ -12,11 +12,11 @@ a state (`symmetric`): within a tick, packets of different senders are not in th
 # pyright: basic, reportUnknownMemberType=false
 
 import math
-from typing import NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import BoolArray, IntArray
+from swarmwire.comms.base.arrays import Table, record_type
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.kernels import kernel, njit
@@ -51,39 +51,30 @@ def bad_after(was_bad, dt_s, a, b, u):
     return u < share + ((1.0 if was_bad else 0.0) - share) * math_compiled.exp(-elapsed)
 
 
-class BurstParams(NamedTuple):
-    """The hash table of link states, and the parameters of the chain, as input of kernels."""
-
-    is_used: bool
-    rows: int  # number of robots of all arenas
-    symmetric: bool  # True: both directions of a link share a state
-    link: IntArray  # (capacity,) one end x rows + the other, or NO_LINK
-    at_ns: IntArray  # (capacity,) time of its state: that of its latest frame
-    bad: BoolArray  # (capacity,)
-    links: IntArray  # (1,) number of links in the table
-    a: float  # rate in 1/s at which good turns bad
-    b: float  # rate in 1/s at which bad turns good
-    loss_bad: float
-    loss_good: float
-
-
-NO_TABLE = np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.bool_), np.zeros(1, np.int64)
-NO_BURSTS = BurstParams(False, 0, False, *NO_TABLE, 0.0, 0.0, 0.0, 0.0)
+# The state of a link in the hash table.
+LINK_STATE = record_type(
+    [
+        ("link", np.int64),  # one end x rows + the other, or NO_LINK
+        ("at_ns", np.int64),  # time of its state: that of its latest frame
+        ("is_bad", np.bool_),
+    ]
+)
+NO_STATES: Table = np.empty(0, LINK_STATE)
 
 
 @njit()
-def _slot(links, link):
+def _slot(states, link):
     """Return the slot of a link in the table, or the empty slot for it."""
-    mask = np.uint64(len(links) - 1)
+    mask = np.uint64(len(states) - 1)
     # The upper half of the product depends on all bits of the link, its lowest bits on the lowest ones alone.
     slot = ((np.uint64(link) * HASH_FACTOR) >> np.uint64(32)) & mask
-    while links[slot] != NO_LINK and links[slot] != link:
+    while states[slot].link != NO_LINK and states[slot].link != link:
         slot = (slot + np.uint64(1)) & mask
     return slot
 
 
 @kernel()
-def burst_loss(params, frame):
+def burst_loss(params, states, frame):
     """Return BURST by the link's state, which changes with the time since its last frame."""
     if not params.is_used:
         return UNDER_WAY
@@ -91,18 +82,17 @@ def burst_loss(params, frame):
     if params.symmetric:
         a, b = min(a, b), max(a, b)
     link = a * params.rows + b
-    slot = _slot(params.link, link)
-    silent_s = np.inf
-    if params.link[slot] == NO_LINK:
-        params.link[slot] = link
-        params.links[0] += 1
+    state, silent_s = states[_slot(states, link)], np.inf
+    if state.link == NO_LINK:
+        state.link = link
     else:
-        silent_s = abs(frame.at_ns - params.at_ns[slot]) / NS_PER_S
+        silent_s = abs(frame.at_ns - state.at_ns) / NS_PER_S
     u = loss_uniform(frame, STATE, ACK_STATE)
-    bad = bad_after(params.bad[slot], silent_s, params.a, params.b, u)
-    if frame.at_ns >= params.at_ns[slot]:
-        params.at_ns[slot], params.bad[slot] = frame.at_ns, bad
-    return BURST if loss_uniform(frame, LOSS, ACK_LOSS) < (params.loss_bad if bad else params.loss_good) else UNDER_WAY
+    is_bad = bad_after(state.is_bad, silent_s, params.a, params.b, u)
+    if frame.at_ns >= state.at_ns:
+        state.at_ns, state.is_bad = frame.at_ns, is_bad
+    loss = params.loss_bad if is_bad else params.loss_good
+    return BURST if loss_uniform(frame, LOSS, ACK_LOSS) < loss else UNDER_WAY
 
 
 class BurstLoss(FrameLoss):
@@ -115,6 +105,15 @@ class BurstLoss(FrameLoss):
     name = "burst_loss"
     keys = ("bursts",)
     has_state = True
+    FIELDS: ClassVar = [
+        ("is_used", np.bool_),
+        ("symmetric", np.bool_),  # True: both directions of a link share a state
+        ("rows", np.int64),  # number of robots of all arenas
+        ("a", np.float64),  # rate in 1/s at which good turns bad
+        ("b", np.float64),  # rate in 1/s at which bad turns good
+        ("loss_bad", np.float64),
+        ("loss_good", np.float64),
+    ]
 
     @classmethod
     def create(cls, context: ChannelContext) -> FrameLoss | None:
@@ -125,20 +124,27 @@ class BurstLoss(FrameLoss):
     def __init__(self, bursts: Bursts, rows: int) -> None:
         """Create a table without links; `rows` is the number of robots of all arenas."""
         self._bursts, self._rows = bursts, rows
-        self._clear(MIN_CAPACITY)
+        self._states, self._most_links = _no_links(MIN_CAPACITY), 0
 
     def __len__(self) -> int:
         """Number of links in the table."""
-        return int(self._links[0])
+        return int(np.count_nonzero(self._states["link"] != NO_LINK))
 
-    def params(self, from_ns: int, links: int) -> BurstParams:
-        """Return the table, with room for `links` more links."""
-        if 2 * (len(self) + links) > len(self._link):
-            self._rebuild(from_ns, links)
-        a, b = 1.0 / self._bursts.good_s, 1.0 / self._bursts.bad_s
-        loss_bad, loss_good = float(self._bursts.loss_bad), float(self._bursts.loss_good)
-        table = self._link, self._at_ns, self._bad, self._links
-        return BurstParams(True, self._rows, self._bursts.symmetric, *table, a, b, loss_bad, loss_good)
+    def write(self, params: Any) -> None:
+        """Set the parameters of the chain."""
+        bursts = self._bursts
+        params.is_used, params.symmetric, params.rows = True, bursts.symmetric, self._rows
+        params.a, params.b = 1.0 / bursts.good_s, 1.0 / bursts.bad_s
+        params.loss_bad, params.loss_good = bursts.loss_bad, bursts.loss_good
+
+    def reserve(self, from_ns: int, links: int) -> Table:
+        """Return the table, with room for `links` more links, for frames at `from_ns` or later."""
+        self._most_links += links
+        if 2 * self._most_links > len(self._states):
+            self._most_links = len(self) + links
+            if 2 * self._most_links > len(self._states):
+                self._rebuild(from_ns, links)
+        return self._states
 
     @property
     def passing(self) -> float:
@@ -150,33 +156,27 @@ class BurstLoss(FrameLoss):
         assert isinstance(previous, BurstLoss)
         # Drop outdated states now: slower bursts must not depend on outdated states that happen to be in the table.
         previous._rebuild(at_ns, 0)
-        self._link, self._at_ns, self._bad, self._links = (
-            previous._link,
-            previous._at_ns,
-            previous._bad,
-            previous._links,
-        )
-
-    def _clear(self, capacity: int) -> None:
-        self._link = np.full(capacity, NO_LINK, np.int64)
-        self._at_ns = np.zeros(capacity, np.int64)
-        self._bad = np.zeros(capacity, np.bool_)
-        self._links = np.zeros(1, np.int64)
+        self._states, self._most_links = previous._states, previous._most_links
 
     def _rebuild(self, now_ns: int, room: int) -> None:
         """Rebuild the table for states valid at `now_ns` and `room` more links, at most a quarter full."""
         relaxation_s = 1.0 / (1.0 / self._bursts.good_s + 1.0 / self._bursts.bad_s)
         # One relaxation time more than `bad_after` needs: rounding then cannot make a difference.
         silent_ns = math.ceil((FORGOTTEN + 1.0) * relaxation_s * NS_PER_S)
-        is_valid = (self._link != NO_LINK) & (now_ns - self._at_ns <= silent_ns)
-        link, at_ns, bad = self._link[is_valid], self._at_ns[is_valid], self._bad[is_valid]
-        self._clear(max(1 << (4 * (len(link) + room) - 1).bit_length(), MIN_CAPACITY))
-        _insert(self._link, self._at_ns, self._bad, link, at_ns, bad)
-        self._links[0] = len(link)
+        states = self._states
+        valid = states[(states["link"] != NO_LINK) & (now_ns - states["at_ns"] <= silent_ns)]
+        self._most_links = len(valid) + room
+        self._states = _no_links(max(1 << (4 * self._most_links - 1).bit_length(), MIN_CAPACITY))
+        _insert(self._states, valid)
+
+
+def _no_links(capacity: int) -> Table:
+    states: Table = np.zeros(capacity, LINK_STATE)
+    states["link"] = NO_LINK
+    return states
 
 
 @njit()
-def _insert(links, links_at_ns, links_bad, link, at_ns, bad):
-    for i in range(len(link)):
-        slot = _slot(links, link[i])
-        links[slot], links_at_ns[slot], links_bad[slot] = link[i], at_ns[i], bad[i]
+def _insert(states, new):
+    for k in range(len(new)):
+        states[_slot(states, new[k].link)] = new[k]

@@ -11,18 +11,18 @@ To add a loss, a delay or a measurement:
    several keys is a frozen dataclass in `config/impairments.py`; `[radio.<name>]` follows from its field. They are
    separate from the kernels, since a scenario is read without a compiler.
 2. Write its file in `stages/`: a class with its `name`, the `keys` of [radio] that it uses, and `create(context)`,
-   which returns None if this radio does not need it; and a kernel. A loss is a `FrameLoss` (`loss.py`, which ends with
-   a short one) with a kernel for one frame. It sees a `ReceivedFrame`: robots, packet and time, but neither distance
-   nor poses nor power; a loss that depends on distance is a path loss model (CONTRIBUTING.md). A delay or a measurement
-   is a `Stage` with the FIELDS of its parameters, and a kernel that returns the delay or the value (`delays.py`).
-   Docstrings state formulas, sources and units. Draws are keyed by the arena's key, (sender, receiver, sequence) as
-   indices in the arena (`link_draws.py`), and a purpose of its own, so that no stage shifts the draws of another. A new
-   drop reason is a new `Fate`, with its colour in `FATE_COLORS` (`metrics/pictures/drawing/canvas.py`) and, if every
-   receiver has it on a link of its own, an entry in `LINK_FATES` (`metrics/records/run_folder/radio_totals.py`). A new
-   measurement is a field of LINK (`links.py`), listed in `Measures.columns`.
-3. List the class, and call the kernel: a loss in `LOSS_MODELS`, `Losses` and `loss_fate` (`losses.py`), with parameters
-   of the same type for radios that lack it; another stage in `AFTER_RECEPTION` and `after_reception` below, in its
-   position.
+   which returns None if this radio does not need it; the FIELDS of its parameters; and a kernel. A loss is a
+   `FrameLoss` (`loss.py`, which ends with a short one) with a kernel for one frame. It sees a `ReceivedFrame`: robots,
+   packet and time, but neither distance nor poses nor power; a loss that depends on distance is a path loss model
+   (CONTRIBUTING.md). A delay or a measurement is a `Stage` with a kernel that returns the delay or the value
+   (`delays.py`). Docstrings state formulas, sources and units. Draws are keyed by the arena's key, (sender, receiver,
+   sequence) as indices in the arena (`link_draws.py`), and a purpose of its own, so that no stage shifts the draws of
+   another. A new drop reason is a new `Fate`, with its colour in `FATE_COLORS` (`metrics/pictures/drawing/canvas.py`)
+   and, if every receiver has it on a link of its own, an entry in `LINK_FATES`
+   (`metrics/records/run_folder/radio_totals.py`). A new measurement is a field of LINK (`links.py`), listed in
+   `Measures.columns`.
+3. List the class, and call the kernel: a loss in `LOSS_MODELS` and `loss_fate` (`losses.py`), another stage in
+   `AFTER_RECEPTION` and `after_reception` below, in its position.
 
 A loss that depends on the link (`varies`) has a `delivery`, which the radio graph and the coverage of both models use.
 """
@@ -65,7 +65,7 @@ from swarmwire.comms.radio.stages.measurements import (
     to_sender_m,
 )
 from swarmwire.comms.radio.stages.stage import Stage
-from swarmwire.comms.radio.stages.trace import NO_TRACE_DELAY, TraceDelay, TraceDelayParams, trace_delay_ns
+from swarmwire.comms.radio.stages.trace import TraceDelay, trace_delay_ns
 from swarmwire.comms.robot.packets import Fate
 
 BLOCKED = int(Fate.BLOCKED)
@@ -91,6 +91,7 @@ PARAMS = record_type(
         ("wrap_x_m", np.float64),  # sides of a torus; 0 in arenas with walls
         ("wrap_y_m", np.float64),
         ("needs_distance", np.bool_),
+        ("has_any", np.bool_),
     ]
 )
 
@@ -103,29 +104,19 @@ class StagesBefore(NamedTuple):
     losses: Losses
 
 
-class StagesAfter(NamedTuple):
-    """Parameters of the stages after reception."""
-
-    params: Table  # one record of type PARAMS
-    trace_delay: TraceDelayParams
-    has_any: bool
-
-
-def stages_after(context: ChannelContext) -> StagesAfter:
-    """Return the stages after reception of this medium."""
+def stages_after(context: ChannelContext) -> Table:
+    """Return the parameters of the stages after reception of this medium: one record of type PARAMS."""
     stages = [stage for kind in AFTER_RECEPTION if (stage := kind.create(context)) is not None]
     params: Table = np.zeros(1, PARAMS)
-    record, trace_delay = params[0], NO_TRACE_DELAY
+    record = params[0]
+    record.has_any = bool(stages)
     record.wrap_x_m, record.wrap_y_m = context.wrap_m
     record.needs_distance = any(
         isinstance(stage, MeasuredRange | MeasuredBearing | PropagationDelay) for stage in stages
     )
     for stage in stages:
-        if isinstance(stage, TraceDelay):
-            trace_delay = stage.params
-        else:
-            stage.write(record[stage.name])
-    return StagesAfter(params, trace_delay, bool(stages))
+        stage.write(record[stage.name])
+    return params
 
 
 @kernel()
@@ -142,13 +133,13 @@ def fate_before_reception(stages: Any, cuts: Any, pose: Any, frame: Any, goes_on
 
 
 @kernel()
-def after_reception(stages: Any, pose: Any, frame: Any, link: Any):
-    """Measure and delay a link that was received; in place."""
-    params, dx, dy, distance_m = stages.params[0], 0.0, 0.0, 0.0
+def after_reception(stages: Any, measured: Any, pose: Any, frame: Any, link: Any):
+    """Measure and delay a link that was received, by `stages_after` and `LinkTraces.values`; in place."""
+    params, dx, dy, distance_m = stages[0], 0.0, 0.0, 0.0
     if params.needs_distance:
         dx, dy, dz = to_sender_m(pose, frame.sender, frame.receiver, params.wrap_x_m, params.wrap_y_m)
         distance_m = np.sqrt(dx * dx + dy * dy + dz * dz)
-    delay_ns = trace_delay_ns(stages.trace_delay, frame, link.final_at_ns)
+    delay_ns = trace_delay_ns(params.trace_delay, measured, frame, link.final_at_ns)
     if params.measured_range.is_used:
         link.range_m = measured_range_m(params.measured_range, distance_m, frame)
     if params.measured_bearing.is_used:

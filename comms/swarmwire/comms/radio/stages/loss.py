@@ -6,6 +6,8 @@ One kernel decides a frame at one receiver, in the unit disk and in the PHY.
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar
 
+import numpy as np
+
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.draws import purpose
 from swarmwire.comms.base.kernels import kernel
@@ -30,6 +32,7 @@ class FrameLoss(ABC):
     keys: ClassVar[tuple[str, ...]]  # keys of [radio] that it uses
     has_state: ClassVar[bool] = False  # True: links have state, and frames of a link come in the order of time
     varies: ClassVar[bool] = False  # True: `delivery` depends on the link
+    FIELDS: ClassVar[list[tuple[Any, ...]]]  # of its record in the parameters of all losses; all 0: no effect
 
     @classmethod
     @abstractmethod
@@ -37,8 +40,8 @@ class FrameLoss(ABC):
         """Return the loss model of this medium; None if its radio does not have it."""
 
     @abstractmethod
-    def params(self, from_ns: int, links: int) -> Any:
-        """Return the input of the kernel, for frames at `from_ns` or later on at most `links` links."""
+    def write(self, params: Any) -> None:
+        """Set the fields of `params`, its record."""
 
     @property
     def passing(self) -> float:
@@ -54,9 +57,9 @@ class FrameLoss(ABC):
 
 
 @kernel()
-def fixed_loss(loss: float, frame: Any):
+def fixed_loss(params: Any, frame: Any):
     """Return LOST if u < loss."""
-    return LOST if loss > 0.0 and loss_uniform(frame, LOSS, ACK_LOSS) < loss else UNDER_WAY
+    return LOST if params.loss > 0.0 and loss_uniform(frame, LOSS, ACK_LOSS) < params.loss else UNDER_WAY
 
 
 class FixedLoss(FrameLoss):
@@ -64,6 +67,7 @@ class FixedLoss(FrameLoss):
 
     name = "fixed_loss"
     keys = ("loss",)
+    FIELDS: ClassVar = [("loss", np.float64)]
 
     @classmethod
     def create(cls, context: ChannelContext) -> FrameLoss | None:
@@ -73,9 +77,9 @@ class FixedLoss(FrameLoss):
     def __init__(self, loss: float) -> None:
         self._loss = float(loss)
 
-    def params(self, from_ns: int, links: int) -> float:
-        """Return the probability."""
-        return self._loss
+    def write(self, params: Any) -> None:
+        """Set the probability."""
+        params.loss = self._loss
 
     @property
     def passing(self) -> float:

@@ -3,29 +3,39 @@
 import math
 from typing import Any, NamedTuple
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray
+import numpy as np
+
+from swarmwire.comms.base.arrays import FloatArray, IntArray, Table, record_type
 from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import UNDER_WAY
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.links import RECEIVED
-from swarmwire.comms.radio.stages.burst_loss import NO_BURSTS, BurstLoss, BurstParams, burst_loss
+from swarmwire.comms.radio.stages.burst_loss import NO_STATES, BurstLoss, burst_loss
 from swarmwire.comms.radio.stages.loss import FixedLoss, FrameLoss, fixed_loss
-from swarmwire.comms.radio.stages.trace import NO_TRACE, TraceLoss, TraceParams, trace_loss
+from swarmwire.comms.radio.stages.trace import TraceLoss, trace_loss
+from swarmwire.comms.radio.traces import NO_VALUES, TraceValues
 
 # The order of the tests in a unit disk, see `loss_fate`.
 LOSS_MODELS: tuple[type[FrameLoss], ...] = (FixedLoss, BurstLoss, TraceLoss)
 
-AT_FRAME_NS = -1  # `Losses.trace_ns` of a unit disk: traces are read at the time of each frame
+AT_FRAME_NS = -1  # `trace_ns` of a unit disk: traces are read at the time of each frame
+
+
+LOSS_PARAMS = record_type(
+    [
+        *((kind.name, record_type(kind.FIELDS)) for kind in LOSS_MODELS),
+        ("trace_ns", np.int64),  # start of the current poses, see `ReceivedFrame`; or AT_FRAME_NS
+        ("has_any", np.bool_),
+    ]
+)
 
 
 class Losses(NamedTuple):
     """The losses of a radio as input of kernels; one type for all radios, so that event loops compile once."""
 
-    trace_ns: int  # start of the current poses, see `ReceivedFrame`; or AT_FRAME_NS
-    has_any: bool
-    fixed: float
-    burst: BurstParams
-    trace: TraceParams
+    params: Table  # one record of type LOSS_PARAMS
+    burst_links: Table  # states of links, of type LINK_STATE
+    measured: TraceValues  # `LinkTraces.values`
 
 
 @kernel()
@@ -34,22 +44,24 @@ def loss_fate(losses: Any, frame: Any):
 
     Bursts come last in a PHY: they see no frame that another loss ends. A unit disk tests them before the trace.
     """
-    is_disk = losses.trace_ns == AT_FRAME_NS
-    fate = fixed_loss(losses.fixed, frame)
+    params = losses.params[0]
+    is_disk = params.trace_ns == AT_FRAME_NS
+    fate = fixed_loss(params.fixed_loss, frame)
     if fate == UNDER_WAY and not is_disk:
-        fate = trace_loss(losses.trace, frame)
+        fate = trace_loss(params.trace_loss, losses.measured, frame)
     if fate == UNDER_WAY:
-        fate = burst_loss(losses.burst, frame)
+        fate = burst_loss(params.burst_loss, losses.burst_links, frame)
     if fate == UNDER_WAY and is_disk:
-        fate = trace_loss(losses.trace, frame)
+        fate = trace_loss(params.trace_loss, losses.measured, frame)
     return fate
 
 
 @kernel()
 def stateless_loss_fate(losses: Any, frame: Any):
     """Return the fate in a unit disk without the losses that have state: the frame never goes on air."""
-    fate = fixed_loss(losses.fixed, frame)
-    return trace_loss(losses.trace, frame) if fate == UNDER_WAY else fate
+    params = losses.params[0]
+    fate = fixed_loss(params.fixed_loss, frame)
+    return trace_loss(params.trace_loss, losses.measured, frame) if fate == UNDER_WAY else fate
 
 
 @kernel()
@@ -68,19 +80,19 @@ class LossChain:
         has_state: True if frames of a link must be tested in the order of time.
     """
 
-    def __init__(self, models: list[FrameLoss]) -> None:
-        self._use(models)
+    def __init__(self, models: list[FrameLoss], measured: TraceValues = NO_VALUES) -> None:
+        self._use(models, measured)
 
     @classmethod
     def create(cls, context: ChannelContext) -> "LossChain":
         """Return the losses of this medium."""
         models = (kind.create(context) for kind in LOSS_MODELS)
-        return LossChain([model for model in models if model is not None])
+        return LossChain([model for model in models if model is not None], context.measured)
 
     def tune(self, context: ChannelContext, at_ns: int) -> None:
         """Use the radio parameters of `context` from `at_ns` on; losses keep their state."""
         previous = {type(model): model for model in self.models}
-        self._use(LossChain.create(context).models)
+        self._use(LossChain.create(context).models, context.measured)
         for model in self.models:
             if type(model) in previous:
                 model.continue_from(previous[type(model)], at_ns)
@@ -90,13 +102,10 @@ class LossChain:
 
         In a PHY the robots have been at their poses since `trace_ns`; a unit disk has AT_FRAME_NS.
         """
-        if self._unchanging is not None and self._unchanging.trace_ns == trace_ns:
-            return self._unchanging
-        params = {type(model): model.params(from_ns, links) for model in self.models}
-        fixed, burst = params.get(FixedLoss, 0.0), params.get(BurstLoss, NO_BURSTS)
-        losses = Losses(trace_ns, bool(self.models), fixed, burst, params.get(TraceLoss, NO_TRACE))
-        self._unchanging = None if self.has_state else losses
-        return losses
+        self._losses.params["trace_ns"] = trace_ns
+        if self._bursts is not None:
+            self._losses = self._losses._replace(burst_links=self._bursts.reserve(from_ns, links))
+        return self._losses
 
     def delivery(self, sender: IntArray, receiver: IntArray, at_ns: int) -> FloatArray | float:
         """Return the part of the delivery that depends on the link between robot rows, (k,); `passing` is the other."""
@@ -110,7 +119,12 @@ class LossChain:
         """True if `delivery` depends on the link."""
         return any(model.varies for model in self.models)
 
-    def _use(self, models: list[FrameLoss]) -> None:
-        self.models, self._unchanging = models, None
+    def _use(self, models: list[FrameLoss], measured: TraceValues) -> None:
+        self.models, params = models, np.zeros(1, LOSS_PARAMS)
+        params[0].has_any = bool(models)
+        for model in models:
+            model.write(params[0][model.name])
+        self._losses = Losses(params, NO_STATES, measured)
+        self._bursts = next((model for model in models if isinstance(model, BurstLoss)), None)
         self.passing = math.prod((model.passing for model in models), start=1.0)
         self.has_state = any(model.has_state for model in models)

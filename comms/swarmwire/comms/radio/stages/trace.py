@@ -3,7 +3,7 @@
 Measured strengths replace the modelled ones of a PHY (`phy/pairs.py`).
 """
 
-from typing import Any, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,35 +16,27 @@ from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.stages.link_draws import loss_uniform
 from swarmwire.comms.radio.stages.loss import FrameLoss
 from swarmwire.comms.radio.stages.stage import Stage
-from swarmwire.comms.radio.traces import NO_VALUES, LinkTrace, LinkTraces, TraceValues, value_at
+from swarmwire.comms.radio.traces import DELAY, FIRST, RATIO, LinkTraces, value_at
 from swarmwire.comms.robot.packets import Fate
 
 TRACE, ACK_TRACE = purpose("trace"), purpose("trace of an acknowledgement")
 RECEIVED, LOST, OUT_OF_RANGE = int(Fate.RECEIVED), int(Fate.LOST), int(Fate.OUT_OF_RANGE)
 
 
-class TraceParams(NamedTuple):
-    """The measured links of each arena, as input of the kernel."""
-
-    is_used: bool
-    robots: int  # robots per arena
-    others_end: bool  # True: links without a value are out of range
-    ratio: TraceValues  # delivery ratio
-    first: TraceValues  # `LinkTraces.first_values`
-
-
-NO_TRACE = TraceParams(False, 0, False, NO_VALUES, NO_VALUES)
+@kernel()
+def measured_at(values: Any, quantity: int, robots: int, frame: Any, at_ns: int):
+    """Return a quantity of `LinkTraces.values` on the frame's link at a time; NaN if it was not measured."""
+    return value_at(values, (quantity * robots + frame.s) * robots + frame.r, at_ns)
 
 
 @kernel()
-def trace_loss(params: Any, frame: Any):
+def trace_loss(params: Any, values: Any, frame: Any):
     """Return OUT_OF_RANGE for a link without a value, unless the model serves it; LOST if u >= ratio."""
     if not params.is_used:
         return UNDER_WAY
-    link = frame.s * params.robots + frame.r
-    if params.others_end and np.isnan(value_at(params.first, link, frame.trace_ns)):
+    if params.others_end and np.isnan(measured_at(values, FIRST, params.robots, frame, frame.trace_ns)):
         return OUT_OF_RANGE
-    ratio = value_at(params.ratio, link, frame.trace_ns)
+    ratio = measured_at(values, RATIO, params.robots, frame, frame.trace_ns)
     if ratio < 1.0 and loss_uniform(frame, TRACE, ACK_TRACE) >= ratio:  # False for NaN: no ratio was measured
         return LOST
     return UNDER_WAY
@@ -60,6 +52,11 @@ class TraceLoss(FrameLoss):
     name = "trace_loss"
     keys = ("trace",)
     varies = True
+    FIELDS: ClassVar = [
+        ("is_used", np.bool_),
+        ("others_end", np.bool_),  # True: links without a value are out of range
+        ("robots", np.int64),  # robots per arena
+    ]
 
     @classmethod
     def create(cls, context: ChannelContext) -> FrameLoss | None:
@@ -70,13 +67,10 @@ class TraceLoss(FrameLoss):
 
     def __init__(self, traces: LinkTraces, others_end: bool, robots: int) -> None:
         self._traces, self._others_end, self._robots = traces, others_end, robots
-        ratio = traces.delivery_ratio
-        ratios = NO_VALUES if ratio is None else ratio.values
-        self._params = TraceParams(True, robots, others_end, ratios, traces.first_values)
 
-    def params(self, from_ns: int, links: int) -> TraceParams:
-        """Return the measured values of all times."""
-        return self._params
+    def write(self, params: Any) -> None:
+        """Set the number of robots, and what happens to other links."""
+        params.is_used, params.others_end, params.robots = True, self._others_end, self._robots
 
     def delivery(self, sender: IntArray, receiver: IntArray, at_ns: int) -> FloatArray:
         """Return the ratio, 1 if none was measured; 0 for links without a value, unless `others` is "model"."""
@@ -87,23 +81,12 @@ class TraceLoss(FrameLoss):
         return ratio * self._traces.has_values(s, r, times_ns) if self._others_end else ratio
 
 
-class TraceDelayParams(NamedTuple):
-    """The measured delays of each arena, as input of the kernel."""
-
-    is_used: bool
-    robots: int  # robots per arena
-    delay_s: TraceValues
-
-
-NO_TRACE_DELAY = TraceDelayParams(False, 0, NO_VALUES)
-
-
 @kernel()
-def trace_delay_ns(params: Any, frame: Any, at_ns: int):
+def trace_delay_ns(params: Any, values: Any, frame: Any, at_ns: int):
     """Return the delay measured on the frame's link at a time, rounded to ns; 0 if none was measured."""
     if not params.is_used:
         return 0
-    delay_s = value_at(params.delay_s, frame.s * params.robots + frame.r, at_ns)
+    delay_s = measured_at(values, DELAY, params.robots, frame, at_ns)
     return 0 if np.isnan(delay_s) else np.int64(np.rint(delay_s * NS_PER_S))
 
 
@@ -112,11 +95,16 @@ class TraceDelay(Stage):
 
     name = "trace_delay"
     keys = ("trace",)
+    FIELDS: ClassVar = [("is_used", np.bool_), ("robots", np.int64)]
 
     @classmethod
-    def create(cls, context: ChannelContext) -> "TraceDelay | None":
+    def create(cls, context: ChannelContext) -> Stage | None:
         """Return the stage if the radio has a trace; without delays it has no effect."""
-        return None if context.traces is None else TraceDelay(context.traces.delay_s, context.robots)
+        return None if context.traces is None else TraceDelay(context.robots)
 
-    def __init__(self, delay_s: LinkTrace | None, robots: int) -> None:
-        self.params = NO_TRACE_DELAY if delay_s is None else TraceDelayParams(True, robots, delay_s.values)
+    def __init__(self, robots: int) -> None:
+        self._robots = robots
+
+    def write(self, params: Any) -> None:
+        """Set the number of robots."""
+        params.is_used, params.robots = True, self._robots

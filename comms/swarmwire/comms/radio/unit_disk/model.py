@@ -75,7 +75,7 @@ def decide(
         first_epoch: the first epoch in `alive_in`.
         cuts: the active disruption.
         before: `StagesBefore`.
-        after: `StagesAfter`.
+        after: `stages_after`.
     """
     first, other, robots = neighbours.first, neighbours.other, len(pose) // len(keys)
     row = np.full(used[0], ABSENT)  # first link of each packet that is due
@@ -119,7 +119,7 @@ def decide(
                 link.in_range, link.final_at_ns, link.rssi_dbm = is_in_range, at_ns, np.nan
                 link.fate = RECEIVED if fate == UNDER_WAY else fate
                 if fate == UNDER_WAY:
-                    after_reception(after, pose, frame, link)
+                    after_reception(after, before.losses.measured, pose, frame, link)
     for p in range(used[0]):
         if row[p] != ABSENT:
             packet = packets[p]

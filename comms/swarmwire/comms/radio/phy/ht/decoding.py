@@ -107,7 +107,7 @@ def _fate(params, losses, state, s, i, start_ns, end_ns, bits, rate, sequence, d
     if draw_purpose == HEADER:
         return RECEIVED
     is_control, at_ns = draw_purpose == CONTROL, state.robot[s].on_air_ns
-    frame = ReceivedFrame(key, s, r, a, b, sequence, attempt, is_control, at_ns, losses.trace_ns)
+    frame = ReceivedFrame(key, s, r, a, b, sequence, attempt, is_control, at_ns, losses.params[0].trace_ns)
     return frame_fate(losses, frame)
 
 
