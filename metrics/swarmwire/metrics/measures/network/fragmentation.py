@@ -34,16 +34,19 @@ class FragmentationMetric(Metric):
     hold_s: float = parameter(1.0, help="a shorter split is no event", unit="s", at_least=0.0)
 
     @abstractmethod
-    def value(self, events: "Fragmentation", counted: IntArray) -> FloatArray:
-        """Return the metric (arenas,) from the events so far, and those `counted` in this tick, (arenas,)."""
+    def value(self, events: "Fragmentation", latest: FloatArray) -> FloatArray:
+        """Return the metric (arenas,) from the events so far; `latest` (arenas,) may keep values, NaN at first."""
 
     def begin(self, static: Static) -> Measure:
         """Return a measure that is NaN without a radio."""
-        events = Fragmentation(static, self.hold_s)
+        # The first metric of a tick counts the events for all metrics of the same hold time.
+        own_events, latest = Fragmentation(static, self.hold_s), np.full(static.arenas, np.nan)
 
         def measure(view: TickView) -> FloatArray | float:
-            counted = events.see(view)
-            return np.nan if counted is None else self.value(events, counted)
+            if view.components is None:
+                return np.nan
+            events = view.once((Fragmentation, self.hold_s), lambda: own_events.see(view))
+            return self.value(events, latest)
 
         return measure
 
@@ -67,7 +70,7 @@ class Fragmentation:
         rejoined: (arenas,) events that have ended.
         rejoined_s: length of each event that has ended, in order, one list per arena.
         rejoined_now: arenas in which an event ended in the last tick.
-        statistic_s: (arenas,) a metric's latest statistic of `rejoined_s`; NaN before.
+        counted: (arenas,) events that were counted in the last tick, 0 or 1.
     """
 
     def __init__(self, static: Static, hold_s: float) -> None:
@@ -81,24 +84,21 @@ class Fragmentation:
             counted=np.zeros(arenas, np.int64),
             length_ns=np.full(arenas, NEVER, np.int64),
         )
-        self.started = self._splits.started
+        self.started, self.counted = self._splits.started, self._splits.counted
         self.rejoined: IntArray = np.zeros(arenas, np.int64)
         self.rejoined_s: list[list[float]] = [[] for _ in range(arenas)]
         self.rejoined_now: list[int] = []
-        self.statistic_s: FloatArray = np.full(arenas, np.nan)
 
-    def see(self, view: TickView) -> IntArray | None:
-        """Return the number of events, 0 or 1, that are counted in this tick, (arenas,); None without a radio."""
-        self.rejoined_now = []
-        if view.components is None:
-            return None
-        length_ns = self._splits.length_ns
+    def see(self, view: TickView) -> "Fragmentation":
+        """Count the events of a tick with a radio graph; return this object."""
+        assert view.components is not None
+        self.rejoined_now, length_ns = [], self._splits.length_ns
         if _update(view.components.number, view.truth.time_ns, self._hold_ns, self._splits):
             self.rejoined_now = np.flatnonzero(length_ns != NEVER).tolist()
             self.rejoined[self.rejoined_now] += 1
             for arena in self.rejoined_now:
                 self.rejoined_s[arena].append(int(length_ns[arena]) / NS_PER_S)
-        return self._splits.counted
+        return self
 
 
 @njit()
@@ -136,9 +136,9 @@ class Fragmentations(FragmentationMetric):
     standard = True
     bounds = (0.0, None)
 
-    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+    def value(self, events: Fragmentation, latest: FloatArray) -> FloatArray:
         """Return the events counted in this tick."""
-        return counted.astype(np.float64)
+        return events.counted.astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ class Fragmented(FragmentationMetric):
     help = "1 while the radio graph, once it was whole, has fallen apart for at least hold_s, 0 else"
     bounds = (0.0, 1.0)
 
-    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+    def value(self, events: Fragmentation, latest: FloatArray) -> FloatArray:
         """Return 1 for arenas with an open event."""
         return (events.started - events.rejoined).astype(np.float64)
 
@@ -170,7 +170,7 @@ class Unrejoined(FragmentationMetric):
     standard = True
     bounds = (0.0, 1.0)
 
-    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+    def value(self, events: Fragmentation, latest: FloatArray) -> FloatArray:
         """Return the open events / all events."""
         return (events.started - events.rejoined) / np.where(events.started > 0, events.started, np.nan)
 
@@ -189,11 +189,11 @@ class _Rejoin(FragmentationMetric):
     def statistic(self, lengths_s: list[float]) -> float:
         """Return the statistic of the lengths, one or more, of the events that have ended."""
 
-    def value(self, events: Fragmentation, counted: IntArray) -> FloatArray:
+    def value(self, events: Fragmentation, latest: FloatArray) -> FloatArray:
         """Return the statistic; it changes only in arenas in which an event ended in this tick."""
         for arena in events.rejoined_now:
-            events.statistic_s[arena] = self.statistic(events.rejoined_s[arena])
-        return events.statistic_s
+            latest[arena] = self.statistic(events.rejoined_s[arena])
+        return latest
 
 
 @dataclass(frozen=True)
