@@ -23,6 +23,7 @@ HT_PREAMBLE_NS, OFDM_PREAMBLE_NS, SYMBOL_NS = 36 * US, 20 * US, 4 * US
 ACK_BYTES, BLOCK_ACK_BYTES, REQUEST_BYTES, RTS_BYTES, CTS_BYTES = 14, 32, 24, 20, 14
 DELIMITER_BYTES = 4  # of an MPDU in an A-MPDU; each but the last is padded to a multiple of it
 MAX_MPDUS = 64  # window of a block acknowledgement
+REQUEST_ATTEMPTS = 7  # at a request that only moves the receiver's window: dot11ShortRetryLimit
 MAX_PPDU_NS = 5_484 * US  # aPPDUMaxTime
 MAX_AMPDU_BYTES = 65_535
 NEVER_BYTES = 2**31

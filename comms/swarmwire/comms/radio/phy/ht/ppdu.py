@@ -99,6 +99,7 @@ def acknowledge(state, s, r, is_block):
             packet.is_done = packet.is_settled
             robot.waiting -= 1
     dissolve(state, s)
+    station.requests = 0
     if station.request_to == r:
         station.request_to = NO_ROBOT
     return received / max(members, 1)

@@ -41,6 +41,7 @@ STATION = record_type(
         ("rate", _I),  # row in `PhyParams.log_success`
         ("awaits", _I),  # kind of the frame that answers the frame on air
         ("request_to", _I),  # robot row to which a block acknowledgement request is due, or NO_ROBOT
+        ("requests", _I),  # unanswered requests in a row
         # The response of a receiver.
         ("answer", _I),  # kind of the frame
         ("answer_rate", _I),
