@@ -21,6 +21,7 @@ from swarmwire.deploy.cli.catalogue.robots import SHEET_TABLES
 from swarmwire.deploy.cli.catalogue.schema import CatalogueEntry, CatalogueParameter
 
 NOTHING = "–"
+LONG_FACT = 60  # characters
 SCENARIOS = Path(__file__).parents[1] / "scenarios" / "behaviours"
 SETTING = re.compile(r"(\w+ = .+) in (\[.+\])")  # 'kind = "wheels" in [drive]'
 CHOICES = re.compile(r"one of ([\w.-]+(?:, [\w.-]+)*)")
@@ -36,27 +37,36 @@ RANGES = {  # texts of `expected` as regular expressions, and what replaces them
     rf"\bnumbers above {NUMBER} and at most {NUMBER}": r"numbers > \1, ≤ \2",
     r"\ba (whole )?number\b": r"\1number",
     r"\b1000000000\b": "1e9",
+    " that is not empty": "",
 }
-KEYS = ("key", "unit", "value", "default", "meaning")
+KEYS = ("key", "value", "default", "meaning")
 
 
 def rows_of(kind: str, *columns: str) -> str:
-    """A row for each entry of a kind: its name, its help, then the facts of these titles."""
-    rows = [
-        (code(entry.name), sentence(entry.help), *(_fact(entry, title) for title in columns)) for entry in entries(kind)
-    ]
+    """A row for each entry of a kind: its name, its help, then the facts of these titles; a long one is shown once."""
+    rows: list[tuple[str, ...]] = []
+    first: dict[str, str] = {}  # name of the first entry by fact
+    for entry in entries(kind):
+        facts = [_fact(entry, title) for title in columns]
+        texts = [f"as {first[fact]}" if fact in first else fact for fact in facts]
+        rows.append((code(entry.name), sentence(entry.help), *texts))
+        first = {fact: code(entry.name) for fact in facts if len(fact) > LONG_FACT} | first
     return table((kind_named(kind).singular, "meaning", *columns), rows)
 
 
 def _fact(entry: CatalogueEntry, title: str) -> str:
-    """A fact of an entry; of its kind only the name, which the page explains."""
+    """A fact of an entry: of its kind the name, of a preset's reach the distance; the page explains both."""
     fact = ({entry.mark: "yes"} | dict(entry.facts)).get(title, "")
-    return fact.partition(":")[0] if title == "kind" else fact
+    fact = fact.partition(":")[0] if title == "kind" else fact.removesuffix(" by path loss alone")
+    return "≥ 0" if fact == "0 and more" else fact
 
 
 def facts_of(kind: str, title: str) -> str:
-    """A list with one fact of each entry of a kind, such as its source."""
-    return "".join(f"- {code(entry.name)}: {dict(entry.facts)[title]}\n" for entry in entries(kind))
+    """A list with one fact of each entry of a kind, such as its source; entries with the same share a line."""
+    named: dict[str, list[str]] = {}
+    for entry in entries(kind):
+        named.setdefault(dict(entry.facts)[title], []).append(code(entry.name))
+    return "".join(f"- {', '.join(names)}: {fact}\n" for fact, names in named.items())
 
 
 def details_of(kind: str) -> str:
@@ -102,7 +112,10 @@ def keys_of(path: str = "") -> str:
             entry.parameters()[0] for entry in entries("keys") if entry.name not in tables and "." not in entry.name
         )
     entries_by_name = {entry.name: entry for entry in (*entries("keys"), *entries("radio"))}
-    return "\n".join(_tables(entries_by_name.get(f"{path}.*", entries_by_name[path]), set(), f"{path}."))
+    visited: set[str] = set()
+    if path != "radio":
+        list(_tables(entries_by_name["radio"], visited))  # the page of the radio has these
+    return "\n".join(_tables(entries_by_name.get(f"{path}.*", entries_by_name[path]), visited, f"{path}."))
 
 
 def behaviour_table() -> str:
@@ -115,17 +128,28 @@ def behaviour_table() -> str:
 
 
 def behaviour_details(name: str) -> str:
-    """One behaviour: its needs, docstring and parameters; paragraphs of one before it on the page are a link."""
+    """One behaviour: its needs, docstring and parameters; what one before it on the page has, too, is a link."""
     named = {_snake(entry.name): entry for entry in entries("behaviours")}
     entry, members = named[_snake(name)], PAGES[page_of(_snake(name))]
     paragraphs, links = text_of(entry).split("\n\n"), list[str]()
+    remaining, same = list(entry.parameters()), list[str]()
     for before in (named[member] for member in members[: members.index(_snake(name))]):
         new = [paragraph for paragraph in paragraphs if paragraph not in text_of(before).split("\n\n")]
         if len(new) < len(paragraphs):
-            paragraphs, links = new, [*links, f"[{before.name}](#{before.name.lower()})"]
+            link = f"[{before.name}](#{before.name.lower()})"
+            paragraphs, links = new, [*links, link]
+            equal = [key for key in remaining if any(_is_same(key, other) for other in before.parameters())]
+            remaining = [key for key in remaining if key not in equal]
+            same += [f"{', '.join(code(key.name) for key in equal)}: as in {link}.\n"] if equal else []
     if links:
         paragraphs.append(f"For the rest see {' and '.join(links)}.")
-    return "\n".join([f"Needs: {dict(entry.facts)['needs']}\n", "\n\n".join(paragraphs), "", *_tables(entry, set())])
+    parts = [f"Needs: {dict(entry.facts)['needs']}\n", "\n\n".join(paragraphs), ""]
+    return "\n".join([*parts, *([key_table(remaining)] if remaining else []), *same])
+
+
+def _is_same(key: CatalogueParameter, other: CatalogueParameter) -> bool:
+    """Whether a parameter is another one with the same default and range; a text of its own may be missing."""
+    return replace(key, help=key.help or other.help) == other
 
 
 def _link_to_behaviour(name: str) -> str:
@@ -145,11 +169,10 @@ def _by_radio(entry: CatalogueEntry) -> str:
 
 def body_table() -> str:
     """Every figure of the bodies' sheets that differs from its key's default: a table per part, a column per body."""
-    bodies, units = entries("bodies"), dict[str, str]()
+    bodies = entries("bodies")
     sheets, sensors = dict[str, dict[str, str]](), dict[str, list[str]]()
     for body in bodies:
         figures = {path: key for path, key in _figures(body).items() if key.value not in (None, _defaults().get(path))}
-        units |= {path: key.unit for path, key in figures.items()}
         speeds = {title: text for title, text in body.facts if title.startswith("fastest")}
         sheets[body.name] = speeds | {path: _figure(key.value) for path, key in figures.items()}
         for fitted in (group.title.removeprefix("sensor: ") for group in body.tables if "sensor: " in group.title):
@@ -158,7 +181,7 @@ def body_table() -> str:
     for path in (path for sheet in sheets.values() for path in sheet):
         parts.setdefault(_part_of_sheet(path), {})[path] = None
     fitted_table = table(("sensor", "bodies"), [(code(name), ", ".join(names)) for name, names in sensors.items()])
-    by_part = {part: _part_table(part, list(paths), units, sheets) for part, paths in parts.items()}
+    by_part = {part: _part_table(part, list(paths), sheets) for part, paths in parts.items()}
     return "\n".join([by_part.pop(""), fitted_table, *by_part.values()])
 
 
@@ -168,15 +191,18 @@ def _part_of_sheet(path: str) -> str:
     return f"sensors.{deeper[0]}" if first == "sensors" else first if first in ("leds", "ros2") else ""
 
 
-def _part_table(part: str, paths: list[str], units: dict[str, str], sheets: dict[str, dict[str, str]]) -> str:
-    """The figures of a part, with a column for the bodies that have the same; none for bodies without figures."""
+def _part_table(part: str, paths: list[str], sheets: dict[str, dict[str, str]]) -> str:
+    """The figures of a part, with a column for the bodies that have the same; none for bodies without figures.
+
+    Keys end in their unit.
+    """
     columns: dict[tuple[str, ...], list[str]] = {}
     for name, sheet in sheets.items():
         if not sheet.keys().isdisjoint(paths):
             columns.setdefault(tuple(sheet.get(path, "") for path in paths), []).append(code(name))
-    head = [code(f"[{part}]") if part else "figure", "unit", *(", ".join(names) for names in columns.values())]
+    head = [code(f"[{part}]") if part else "figure", *(", ".join(names) for names in columns.values())]
     names = [code(path.removeprefix(f"{part}.")) for path in paths]
-    return table(head, zip(names, (units.get(path, "") for path in paths), *columns, strict=True))
+    return table(head, zip(names, *columns, strict=True))
 
 
 def _figures(body: CatalogueEntry) -> dict[str, CatalogueParameter]:
@@ -218,15 +244,14 @@ def _figure(value: Any) -> str:
 
 
 def reading_table() -> str:
-    """The fields of each sensor's readings, and the values that its class derives from them."""
-    rows = [
-        (code(entry.name), code(key.name), key.expected, key.unit, sentence(key.help), toml(key.value))
-        for entry in entries("sensors")
-        for readings in entry.tables
-        if readings.title == "reading"
-        for key in readings.parameters
-    ]
-    return table(("need", "field", "shape", "unit", "meaning", "lost"), rows)
+    """The fields of sensors' readings, and the values that their classes derive; equal ones share a row."""
+    needs: dict[tuple[str, ...], list[str]] = {}
+    for entry in entries("sensors"):
+        for key in (key for readings in entry.tables if readings.title == "reading" for key in readings.parameters):
+            row = (code(key.name), key.expected, sentence(key.help), toml(key.value))
+            needs.setdefault(row, []).append(code(entry.name))
+    rows = [(", ".join(names), *row) for row, names in needs.items()]
+    return table(("need", "field", "shape", "meaning", "lost"), rows)
 
 
 def sensor_tables() -> str:
@@ -302,13 +327,17 @@ def text_of(entry: CatalogueEntry) -> str:
 
 
 def _tables(entry: CatalogueEntry, visited: set[str], prefix: str = "") -> list[str]:
-    """The tables of an entry's parameters, one for each table of keys, unless `seen` has it already."""
+    """The tables of an entry's parameters, one for each table of keys, unless `visited` has it already."""
     return [part for each in entry.tables for part in _by_table(each.parameters, visited, prefix)]
 
 
 def _by_table(parameters: Iterable[CatalogueParameter], visited: set[str], prefix: str) -> Iterator[str]:
-    """The keys without a point, then those of each table within, under its name and its help."""
+    """The keys without a point, then those of each table within, under its name and its help.
+
+    Keys that an earlier table has alike, and choices that their key's help describes, are not shown again.
+    """
     rows, held = dict[str, list[CatalogueParameter]](), dict[str, CatalogueParameter]()
+    shown_rows: dict[tuple[str, ...], str] = {}  # name of its table by row
     for key in parameters:
         table_name, _, name = key.name.rpartition(".")
         rows.setdefault(table_name, []).append(replace(key, name=name))
@@ -320,20 +349,30 @@ def _by_table(parameters: Iterable[CatalogueParameter], visited: set[str], prefi
         visited.add(shown)
         if table_key := held.get(name) or held.get(name.removesuffix(".*")):
             yield f"{code(prefix + name.removesuffix('.*'))}: {table_key.text or sentence(table_key.help)}\n"
-        yield shown
+        earlier = [key for key in keys if _row(key) in shown_rows]
+        yield key_table(key for key in keys if key not in earlier) if len(earlier) > 1 else shown
+        if len(earlier) > 1:
+            tables = " and ".join(dict.fromkeys(code(prefix + shown_rows[_row(key)]) for key in earlier))
+            yield f"{', '.join(code(key.name) for key in earlier)}: as in {tables}.\n"
+        shown_rows = {_row(key): name.removesuffix(".*") for key in keys} | shown_rows
         deeper = tuple(f"{name}.{key.name}".strip(".") for key in keys if key.text)
         yield from (
-            f"{held[path].text}\n" for path in deeper if not any(row_name.startswith(path) for row_name in rows)
+            f"{text}\n"
+            for path in deeper
+            if not any(row_name.startswith(path) for row_name in rows)
+            for text in held[path].text.split("\n\n")
+            if text.partition(": ")[2].rstrip(".") not in held[path].help
         )
 
 
 def key_table(keys: Iterable[CatalogueParameter]) -> str:
     """A row for each parameter."""
-    rows = [
-        (code(key.name), key.unit, _expected(key), _default(key.value, key.required), sentence(key.help))
-        for key in keys
-    ]
-    return table(KEYS, rows)
+    return table(KEYS, map(_row, keys))
+
+
+def _row(key: CatalogueParameter) -> tuple[str, ...]:
+    expected = _with_unit(_expected(key), key.unit)
+    return code(key.name), expected, _default(key.value, key.required), sentence(key.help)
 
 
 def body_key_table(sheet_table: str = "") -> str:
@@ -354,6 +393,11 @@ def _expected(key: CatalogueParameter) -> str:
     for words, symbols in RANGES.items():
         expected = re.sub(words, symbols, expected)
     return expected
+
+
+def _with_unit(text: str, unit: str) -> str:
+    """A text with its unit behind it, unless it has that already."""
+    return text if not unit or text.endswith(f"({unit})") else f"{text} ({unit})"
 
 
 def _default(value: Any, required: bool) -> str:
@@ -396,7 +440,7 @@ TABLES: dict[str, Callable[..., str]] = {
     "leds": lambda: body_key_table("leds"),
     "licences": lambda: table(("for", "packages", "licence"), licences()),
     "metric-details": lambda: details_of("metrics"),
-    "metrics": lambda: rows_of("metrics", "unit", "kind", "bounds", "standard"),
+    "metrics": lambda: rows_of("metrics", "kind", "bounds", "standard"),
     "preset-sources": lambda: facts_of("presets", "source"),
     "presets": lambda: rows_of("presets", "reach", "longest frame", "but"),
     "readings": reading_table,

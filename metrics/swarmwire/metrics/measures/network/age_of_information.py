@@ -67,7 +67,7 @@ class PeakAgeOfInformation(WindowedMetric):
     """
 
     name = "peak_age_of_information"
-    help = "age of what a robot knew of another just before a newer packet came, mean over such updates in the window"
+    help = "age of what a robot knew of another before a newer packet came, mean over such updates in the window, in s"
     unit = "s"
     needs = ("packets",)
     bounds = (0.0, None)
