@@ -169,7 +169,7 @@ def _read(file: Path) -> Received:
 
 def _show(tables: dict[str, list[str]], page: Path | None) -> None:
     if page is not None:
-        rows = write_csv(page, {name: lines for name, lines in tables.items() if name in SECTIONS})
+        rows = write_csv(page, {name: lines for name, lines in tables.items() if name in {*SECTIONS, "closed-forms"}})
         page.write_text(filled(page, tables | rows), encoding="utf-8")
         return
     for name, lines in tables.items():
