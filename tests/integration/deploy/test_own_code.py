@@ -145,7 +145,7 @@ def test_new_project_leaves_an_existing_folder_alone(tmp_path, monkeypatch, caps
 
 @pytest.fixture
 def scenario(tmp_path):
-    (tmp_path / "spread.py").write_text(files_of("docs/api/metrics.md")["spread.py"])
+    (tmp_path / "spread.py").write_text(files_of("docs/api/deploy.md")["spread.py"])
     (tmp_path / "s.toml").write_text(SCENARIO)
     return tmp_path / "s.toml"
 

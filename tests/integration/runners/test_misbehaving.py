@@ -22,7 +22,7 @@ from tests.support.deploy.joiners import LOCALHOST, Joiners
 from tests.support.deploy.runs import LOSSY
 from tests.support.runners import BESIDE, EARLY, INSTEAD, Played, Prank, Says, Turn
 
-PAGE = Path(__file__).parents[3] / "docs" / "dev" / "fault-evidence.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reliability.md"
 ROW = re.compile(r"^\| (.+?) \| (.*?`.+?) \|", re.M)
 FIRST, EVERY = 6, 2  # the tick of the first prank, and ticks from one to the next: what comes late counts in the second
 
