@@ -120,14 +120,14 @@ def experiment_pages() -> Problems:
             campaign for campaign in experiment.campaigns if not (LAYOUT.campaigns / f"{campaign}.toml").exists()
         ]:
             yield f"scenarios/papers: lacks the campaigns {missing} of {name}"
-        if f"({name}.svg)" not in _text(f"docs/experiments/{name}.md"):
-            yield f"docs/experiments/{name}.md: does not show {name}.svg"
+        if f"({name}.svg)" not in _text(f"docs/experiments/{experiment.page}.md"):
+            yield f"docs/experiments/{experiment.page}.md: does not show {name}.svg"
         yield from _experiment(experiment, LAYOUT, f"python -m docs.experiments draw {name}")
 
 
 def _experiment(experiment: Experiment, layout: Layout, draw: str) -> Problems:
-    page = layout.pages / f"{experiment.name}.md"
-    files = page_files(page, experiment.numbers(digests(experiment, layout)))
+    page = layout.pages / f"{experiment.page}.md"
+    files = page_files(page, experiment.name, experiment.numbers(digests(experiment, layout)))
     if any(not file.exists() or file.read_text(encoding="utf-8") != text for file, text in files.items()):
         yield f"{page.relative_to(ROOT)}: its numbers are not those of its data: {draw}"
     yield from _figure(experiment, layout, draw)

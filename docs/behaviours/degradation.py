@@ -24,7 +24,7 @@ HEAD_ROOM = 1.2  # above the lines, for the legend
 def degradation_of(name: str, layout: Layout) -> Experiment:
     """The behaviour's campaign as an experiment, which `docs.experiments` sweeps, digests and draws."""
     shown = find_shown(name, layout)
-    return Experiment(name, shown.title, (name,), (), _Degradation(name, shown))
+    return Experiment(name, shown.title, (name,), (), _Degradation(name, shown), name)
 
 
 @dataclass(frozen=True)

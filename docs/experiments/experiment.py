@@ -5,6 +5,7 @@ COLUMNS = ("order.mean",)            responses that the digests keep
 def draw(runs): ...                  from digests by campaign to a matplotlib figure
 def numbers(runs): ...               to Markdown: tables of the numbers that the page cites
 def digested(folder, runs): ...      where a choice of columns is not enough: from a campaign's folder and table
+PAGE = "pso"                         where another experiment's page shows this one, too
 """
 
 from collections.abc import Mapping
@@ -31,7 +32,7 @@ class Layout:
     campaigns: Path  # CAMPAIGN.toml, as `swarmwire sweep` takes them
     swept: Path  # CAMPAIGN/: folders of campaigns
     data: Path  # CAMPAIGN.parquet: digests of them
-    pages: Path  # figures, and NAME.md if there is a page
+    pages: Path  # figures, and PAGE.md if there is a page
     figure_ending: str = ".svg"  # of a figure's name, after the experiment's
 
     def figure_of(self, name: str) -> Path:
@@ -62,6 +63,7 @@ class Experiment:
     campaigns: tuple[str, ...]
     columns: tuple[str, ...]
     module: Any
+    page: str  # its name, or that of the experiment whose page shows this one
 
     def draw(self, runs: Mapping[str, pl.DataFrame]) -> Any:
         """The matplotlib figure."""
@@ -94,7 +96,9 @@ def find_experiment(name: str, layout: Layout) -> Experiment:
         if not hasattr(module, required):
             raise BadInput(str(file), required, f"is missing: expected {', '.join(NEEDED)}")
     about = (getdoc(module) or "").partition("\n")[0]
-    return Experiment(name, about, tuple(module.CAMPAIGNS), tuple(module.COLUMNS), module)
+    return Experiment(
+        name, about, tuple(module.CAMPAIGNS), tuple(module.COLUMNS), module, getattr(module, "PAGE", name)
+    )
 
 
 def _module(file: Path) -> Any:

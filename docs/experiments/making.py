@@ -116,8 +116,8 @@ def draw(experiment: Experiment, layout: Layout) -> str:
     """
     runs = digests(experiment, layout)
     numbers_text = experiment.numbers(runs)
-    page = layout.pages / f"{experiment.name}.md"
-    files = page_files(page, numbers_text) if page.exists() else {}
+    page = layout.pages / f"{experiment.page}.md"
+    files = page_files(page, experiment.name, numbers_text) if page.exists() else {}
     save(experiment.draw(runs), layout.figure_of(experiment.name))
     for file, text in files.items():
         file.parent.mkdir(exist_ok=True)
@@ -125,29 +125,30 @@ def draw(experiment: Experiment, layout: Layout) -> str:
     return numbers_text
 
 
-def page_files(page: Path, numbers_text: str) -> dict[Path, str]:
-    """Texts by file: the page with the numbers between its marks, and a CSV file for each long table of them.
+def page_files(page: Path, name: str, numbers_text: str) -> dict[Path, str]:
+    """Texts by file: the page with an experiment's numbers between its marks, and a CSV file for each long table.
 
     BadInput unless the page has both marks, once.
     """
     text = page.read_text(encoding="utf-8")
+    begin = BEGIN_MARK if name == page.stem else f"<!-- numbers: {name} -->"
     files: dict[Path, str] = {}
 
     def replacement(table: re.Match[str]) -> str:
         rows = [re.split(r"(?<!\\)\|", line.strip())[1:-1] for line in table[0].splitlines()]
         if len(rows) - 2 < LONG_ROWS and (len(rows) - 2) * len(rows[0]) < LONG_CELLS:
             return table[0]
-        file = page.parent / "numbers" / f"{page.stem}-{len(files) + 1}.csv"
+        file = page.parent / "numbers" / f"{name}-{len(files) + 1}.csv"
         files[file] = csv_text([[cell.strip().replace(r"\|", "|") for cell in row] for row in (rows[0], *rows[2:])])
         path = file.relative_to(page.parent)
         return f"Table: [{file.name}]({path})\n\n```{{csv-table}}\n:file: {path}\n:header-rows: 1\n```\n"
 
     numbers_text = TABLE.sub(replacement, f"{numbers_text}\n").rstrip("\n")
-    if text.count(BEGIN_MARK) != 1 or text.count(END_MARK) != 1 or text.index(BEGIN_MARK) > text.index(END_MARK):
-        raise BadInput(str(page), "", f"expected one line {BEGIN_MARK}, and {END_MARK} below it")
-    files[page] = (
-        f"{text.partition(BEGIN_MARK)[0]}{BEGIN_MARK}\n{numbers_text}\n{END_MARK}{text.partition(END_MARK)[2]}"
-    )
+    before, _, below = text.partition(begin)
+    between, end, after = below.partition(END_MARK)
+    if text.count(begin) != 1 or not end or "<!-- numbers" in between:
+        raise BadInput(str(page), "", f"expected one line {begin}, and {END_MARK} below it")
+    files[page] = f"{before}{begin}\n{numbers_text}\n{END_MARK}{after}"
     return files
 
 

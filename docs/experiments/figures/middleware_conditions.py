@@ -14,8 +14,9 @@ from examples.middleware.node import TRANSPORTS
 from swarmwire.metrics.pictures.drawing.canvas import SMALL_PT, SOFT, plain_axes
 from swarmwire.metrics.pictures.report.page import blank_figure
 
-__all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "numbers"]
+__all__ = ["CAMPAIGNS", "COLUMNS", "PAGE", "digested", "draw", "numbers"]
 
+PAGE = "middleware"
 CAMPAIGNS = (
     *("middleware", "middleware-loss", "middleware-4", "middleware-12"),
     *("middleware-rate", "middleware-standing", "middleware-convoy"),

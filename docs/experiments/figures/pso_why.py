@@ -9,8 +9,9 @@ from docs.experiments.figures._pso import Kind, at, digested, ladder, steps_tabl
 from swarmwire.metrics.pictures.drawing.canvas import ACCENT, CURVE, SOFT, TEXT_PT, plain_axes
 from swarmwire.metrics.pictures.report.page import blank_figure
 
-__all__ = ["CAMPAIGNS", "COLUMNS", "digested", "draw", "numbers"]
+__all__ = ["CAMPAIGNS", "COLUMNS", "PAGE", "digested", "draw", "numbers"]
 
+PAGE = "pso"
 CAMPAIGNS = ("pso-why", "pso-why-model", "pso-noise")
 COLUMNS = ("find_time_s",)
 PARAMS = "robots.particles.params."
