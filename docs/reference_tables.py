@@ -24,6 +24,8 @@ NOTHING = "–"
 LONG_FACT = 60  # characters
 SCENARIOS = Path(__file__).parents[1] / "scenarios" / "behaviours"
 SETTING = re.compile(r"(\w+ = .+) in (\[.+\])")  # 'kind = "wheels" in [drive]'
+ONLY_WITH = re.compile(r"\(only with \w+ = ([^)]+)\)")  # behind the help of a key of some choices
+ONLY = re.compile(r"(.+ only): ")  # before the help of a key of some models
 CHOICES = re.compile(r"one of ([\w.-]+(?:, [\w.-]+)*)")
 NUMBER = r"(-?[\d.e+-]+)"
 RANGES = {  # texts of `expected` as regular expressions, and what replaces them
@@ -338,6 +340,7 @@ def _by_table(parameters: Iterable[CatalogueParameter], visited: set[str], prefi
     """
     rows, held = dict[str, list[CatalogueParameter]](), dict[str, CatalogueParameter]()
     shown_rows: dict[tuple[str, ...], str] = {}  # name of its table by row
+    tables_only: list[CatalogueParameter] = []  # keys that are named, not shown as rows
     for key in parameters:
         table_name, _, name = key.name.rpartition(".")
         rows.setdefault(table_name, []).append(replace(key, name=name))
@@ -348,10 +351,22 @@ def _by_table(parameters: Iterable[CatalogueParameter], visited: set[str], prefi
             continue
         visited.add(shown)
         if table_key := held.get(name) or held.get(name.removesuffix(".*")):
-            yield f"{code(prefix + name.removesuffix('.*'))}: {table_key.text or sentence(table_key.help)}\n"
+            text = table_key.text or sentence(table_key.help)
+            if table_key in tables_only and table_key.help.rstrip(".") not in text:
+                condition = ONLY.match(table_key.help)
+                text = f"{sentence(condition[1] if condition else table_key.help)} {text}"
+            yield f"{code(prefix + name.removesuffix('.*'))}: {text}\n"
         earlier = [key for key in keys if _row(key) in shown_rows]
-        yield key_table(key for key in keys if key not in earlier) if len(earlier) > 1 else shown
-        if len(earlier) > 1:
+        earlier = earlier if len(earlier) > 1 else []
+        within = [key for key in keys if key.expected == "a table" and not key.required and key not in earlier]
+        paths = {key.name: f"{name}.{key.name}".strip(".") for key in within}
+        within = [key for key in within if paths[key.name] in rows and key_table(rows[paths[key.name]]) not in visited]
+        tables_only += [held[paths[key.name]] for key in within]
+        if shown_keys := [key for key in keys if key not in (*earlier, *within)]:
+            yield key_table(shown_keys)
+        if within:
+            yield f"Tables: {', '.join(code(key.name) for key in within)}.\n"
+        if earlier:
             tables = " and ".join(dict.fromkeys(code(prefix + shown_rows[_row(key)]) for key in earlier))
             yield f"{', '.join(code(key.name) for key in earlier)}: as in {tables}.\n"
         shown_rows = {_row(key): name.removesuffix(".*") for key in keys} | shown_rows
@@ -372,7 +387,8 @@ def key_table(keys: Iterable[CatalogueParameter]) -> str:
 
 def _row(key: CatalogueParameter) -> tuple[str, ...]:
     expected = _with_unit(_expected(key), key.unit)
-    return code(key.name), expected, _default(key.value, key.required), sentence(key.help)
+    meaning = ONLY_WITH.sub(lambda match: f"(only {match[1].replace(' or ', ', ')})", key.help)
+    return code(key.name), expected, _default(key.value, key.required), sentence(meaning)
 
 
 def body_key_table(sheet_table: str = "") -> str:
