@@ -1,14 +1,13 @@
-"""Draws docs/performance.svg: speeds from the table of measured rows in docs/dev/performance.md."""
+"""Draws docs/performance.svg: speeds from the measured rows in docs/dev/performance.csv."""
 
-import re
+import csv
 from math import log10
 from pathlib import Path
 
 from docs.pictures.svg import box, line, page, text
 
 TO = Path(__file__).parents[1] / "performance.svg"
-TABLE = Path(__file__).parents[1] / "dev" / "performance.md"
-ROW = re.compile(r"^\| `([\w-]+)` \| [^|]* \| ([\d.,]+) (robot-steps/s|x real time)", re.MULTILINE)
+TABLE = Path(__file__).parents[1] / "dev" / "performance.csv"
 RATE_HZ = 10.0  # of agents in all benchmarks
 BARS = {  # name of the row: label, robots in an arena
     "single-10-radio": ("one run of 10 robots, unit disk", 10),
@@ -25,9 +24,10 @@ BAR, SLOW = "#93c5fd", "#fcd34d"
 
 def speeds(table: str) -> dict[str, float]:
     """The speed of each bar, in multiples of real time."""
-    measured = {name: (float(value.replace(",", "")), unit) for name, value, unit in ROW.findall(table)}
+    measured = {name: value.split() for name, _, value, *_ in csv.reader(table.splitlines())}
     return {
-        name: measured[name][0] / (1.0 if measured[name][1] == "x real time" else robots * RATE_HZ)
+        name: float(measured[name][0].replace(",", ""))
+        / (robots * RATE_HZ if measured[name][1] == "robot-steps/s" else 1.0)
         for name, (_, robots) in BARS.items()
     }
 
