@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from textwrap import dedent
+from textwrap import dedent, wrap
 from typing import Any, cast
 
 from typer.main import get_command
@@ -25,6 +25,7 @@ LONG_FACT = 60  # characters
 SCENARIOS = Path(__file__).parents[1] / "scenarios" / "behaviours"
 SETTING = re.compile(r"(\w+ = .+) in (\[.+\])")  # 'kind = "wheels" in [drive]'
 ONLY_WITH = re.compile(r"\(only with \w+ = ([^)]+)\)")  # behind the help of a key of some choices
+MARKUP = re.compile(r" *([-+*>#|=~]|\d+[.)])")
 ONLY = re.compile(r"(.+ only): ")  # before the help of a key of some models
 CHOICES = re.compile(r"one of ([\w.-]+(?:, [\w.-]+)*)")
 NUMBER = r"(-?[\d.e+-]+)"
@@ -41,7 +42,7 @@ RANGES = {  # texts of `expected` as regular expressions, and what replaces them
     r"\b1000000000\b": "1e9",
     " that is not empty": "",
 }
-KEYS = ("key", "value", "default", "meaning")
+WIDTH = 120  # characters of a line of a page
 
 
 def rows_of(kind: str, *columns: str) -> str:
@@ -54,6 +55,22 @@ def rows_of(kind: str, *columns: str) -> str:
         rows.append((code(entry.name), sentence(entry.help), *texts))
         first = {fact: code(entry.name) for fact in facts if len(fact) > LONG_FACT} | first
     return table((kind_named(kind).singular, "meaning", *columns), rows)
+
+
+def list_of(kind: str) -> str:
+    """An item for each entry of a kind: its name and its help."""
+    return "\n".join(_wrapped(f"- {code(entry.name)}: {sentence(entry.help)}") for entry in entries(kind)) + "\n"
+
+
+def metric_lists() -> str:
+    """An item for each metric: its name, kind, bounds and help; the standard metrics first."""
+    parts: list[str] = []
+    for title, is_standard in {"Standard metrics": True, "Other metrics": False}.items():
+        listed = [entry for entry in entries("metrics") if bool(entry.mark) == is_standard]
+        items = [(entry, _fact(entry, "kind"), _fact(entry, "bounds")) for entry in listed]
+        texts = [f"- {code(entry.name)} ({kind}, {bounds}): {sentence(entry.help)}" for entry, kind, bounds in items]
+        parts += [f"{title}:\n", *map(_wrapped, texts), ""]
+    return "\n".join(parts).replace(", none)", ")")
 
 
 def _fact(entry: CatalogueEntry, title: str) -> str:
@@ -93,7 +110,7 @@ def event_tables() -> str:
     }
     shared = {"at_s": keys["kill"]["at_s"], "for_s": keys["kill"]["for_s"]}
     without = [code(name) for name, event_keys in keys.items() if "for_s" not in event_keys]
-    parts = [key_table(shared.values()), f"{' and '.join(without).capitalize()} have no `for_s`.\n"]
+    parts = [key_list(shared.values()), f"{' and '.join(without).capitalize()} have no `for_s`.\n"]
     visited: set[str] = set()
     for entry in entries("events"):
         own_keys = [key for key in keys[entry.name].values() if key.name not in (*shared, "do")]
@@ -110,7 +127,7 @@ def keys_of(path: str = "") -> str:
     """The keys of a scenario's table, and after them those of each table within; without a path those before any."""
     if not path:
         tables = {entry.name.partition(".")[0] for entry in entries("keys") if "." in entry.name}
-        return key_table(
+        return key_list(
             entry.parameters()[0] for entry in entries("keys") if entry.name not in tables and "." not in entry.name
         )
     entries_by_name = {entry.name: entry for entry in (*entries("keys"), *entries("radio"))}
@@ -146,7 +163,7 @@ def behaviour_details(name: str) -> str:
     if links:
         paragraphs.append(f"For the rest see {' and '.join(links)}.")
     parts = [f"Needs: {dict(entry.facts)['needs']}\n", "\n\n".join(paragraphs), ""]
-    return "\n".join([*parts, *([key_table(remaining)] if remaining else []), *same])
+    return "\n".join([*parts, *([key_list(remaining)] if remaining else []), *same])
 
 
 def _is_same(key: CatalogueParameter, other: CatalogueParameter) -> bool:
@@ -264,7 +281,7 @@ def sensor_tables() -> str:
         if any(each.title == "reading" for each in entry.tables)
     }
     shared = [key for key in next(iter(sheets.values())) if all(key in keys for keys in sheets.values())]
-    parts = ["Keys of every sensor:\n", key_table(shared)]
+    parts = ["Keys of every sensor:\n", key_list(shared)]
     for entry, keys in sheets.items():
         own_keys = [key for key in keys if key not in shared]
         parts.append(f"{code(f'[sensors.{entry.name}]')}: {text_of(entry)}\n")
@@ -346,7 +363,7 @@ def _by_table(parameters: Iterable[CatalogueParameter], visited: set[str], prefi
         rows.setdefault(table_name, []).append(replace(key, name=name))
         held[key.name] = key
     for name, keys in rows.items():
-        shown = key_table(keys)
+        shown = key_list(keys)
         if name and shown in visited:
             continue
         visited.add(shown)
@@ -360,10 +377,10 @@ def _by_table(parameters: Iterable[CatalogueParameter], visited: set[str], prefi
         earlier = earlier if len(earlier) > 1 else []
         within = [key for key in keys if key.expected == "a table" and not key.required and key not in earlier]
         paths = {key.name: f"{name}.{key.name}".strip(".") for key in within}
-        within = [key for key in within if paths[key.name] in rows and key_table(rows[paths[key.name]]) not in visited]
+        within = [key for key in within if paths[key.name] in rows and key_list(rows[paths[key.name]]) not in visited]
         tables_only += [held[paths[key.name]] for key in within]
         if shown_keys := [key for key in keys if key not in (*earlier, *within)]:
-            yield key_table(shown_keys)
+            yield key_list(shown_keys)
         if within:
             yield f"Tables: {', '.join(code(key.name) for key in within)}.\n"
         if earlier:
@@ -380,9 +397,21 @@ def _by_table(parameters: Iterable[CatalogueParameter], visited: set[str], prefi
         )
 
 
-def key_table(keys: Iterable[CatalogueParameter]) -> str:
-    """A row for each parameter."""
-    return table(KEYS, map(_row, keys))
+def key_list(keys: Iterable[CatalogueParameter]) -> str:
+    """A list with an item for each parameter: accepted values, default, meaning."""
+    return "\n".join(_item(*_row(key)) for key in keys) + "\n"
+
+
+def _item(name: str, expected: str, default: str, meaning: str) -> str:
+    """The item of a parameter."""
+    values = [text for text in (expected, default if default in ("", "required") else f"default {default}") if text]
+    return _wrapped(f"- {name}: {', '.join(values)}. {meaning}" if values else f"- {name}: {meaning}")
+
+
+def _wrapped(item: str) -> str:
+    """An item of a list; in one line where a part of it would be Markdown of its own at the start of a line."""
+    lines = wrap(item.strip(), WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    return item.strip() if any(MARKUP.match(line) for line in lines[1:]) else "\n".join(lines)
 
 
 def _row(key: CatalogueParameter) -> tuple[str, ...]:
@@ -391,14 +420,14 @@ def _row(key: CatalogueParameter) -> tuple[str, ...]:
     return code(key.name), expected, _default(key.value, key.required), sentence(meaning)
 
 
-def body_key_table(sheet_table: str = "") -> str:
+def body_key_list(sheet_table: str = "") -> str:
     """The keys of this table of a body's sheet; empty: those before the first table."""
     names = (
         [sheet_table]
         if sheet_table
         else [entry.name for entry in entries("body-keys") if entry.name not in SHEET_TABLES]
     )
-    return key_table(key for entry in entries("body-keys") if entry.name in names for key in entry.parameters())
+    return key_list(key for entry in entries("body-keys") if entry.name in names for key in entry.parameters())
 
 
 def _expected(key: CatalogueParameter) -> str:
@@ -445,22 +474,22 @@ TABLES: dict[str, Callable[..., str]] = {
     "behaviour": behaviour_details,
     "behaviours": behaviour_table,
     "bodies": body_table,
-    "body-keys": body_key_table,
+    "body-keys": body_key_list,
     "body-sources": lambda: facts_of("bodies", "source"),
     "commands": command_tables,
     "drives": lambda: details_of("drives"),
     "events": event_tables,
-    "fates": lambda: rows_of("fates"),
+    "fates": lambda: list_of("fates"),
     "fields": lambda: rows_of("fields", "bytes on air"),
     "keys": keys_of,
-    "leds": lambda: body_key_table("leds"),
+    "leds": lambda: body_key_list("leds"),
     "licences": lambda: table(("for", "packages", "licence"), licences()),
     "metric-details": lambda: details_of("metrics"),
-    "metrics": lambda: rows_of("metrics", "kind", "bounds", "standard"),
+    "metrics": metric_lists,
     "preset-sources": lambda: facts_of("presets", "source"),
     "presets": lambda: rows_of("presets", "reach", "longest frame", "but"),
     "readings": reading_table,
     "robot-radios": lambda: table(robot_radios.HEAD, robot_radios.rows()),
-    "ros2-names": lambda: body_key_table("ros2"),
+    "ros2-names": lambda: body_key_list("ros2"),
     "sensors": sensor_tables,
 }
