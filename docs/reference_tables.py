@@ -18,7 +18,7 @@ from docs.dependencies import licences
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.cli.catalogue.kinds import kind_named, toml
 from swarmwire.deploy.cli.catalogue.robots import SHEET_TABLES
-from swarmwire.deploy.cli.catalogue.schema import CatalogueEntry, CatalogueParameter
+from swarmwire.deploy.cli.catalogue.schema import UNITS, CatalogueEntry, CatalogueParameter
 
 NOTHING = "–"
 LONG_FACT = 60  # characters
@@ -404,6 +404,7 @@ def key_list(keys: Iterable[CatalogueParameter]) -> str:
 
 def _item(name: str, expected: str, default: str, meaning: str) -> str:
     """The item of a parameter."""
+    expected = "" if expected == "number" and default else expected
     values = [text for text in (expected, default if default in ("", "required") else f"default {default}") if text]
     return _wrapped(f"- {name}: {', '.join(values)}. {meaning}" if values else f"- {name}: {meaning}")
 
@@ -415,7 +416,8 @@ def _wrapped(item: str) -> str:
 
 
 def _row(key: CatalogueParameter) -> tuple[str, ...]:
-    expected = _with_unit(_expected(key), key.unit)
+    is_named = any(key.name.endswith(ending) for ending, unit in UNITS.items() if unit == key.unit)
+    expected = _expected(key) if is_named else _with_unit(_expected(key), key.unit)
     meaning = ONLY_WITH.sub(lambda match: f"(only {match[1].replace(' or ', ', ')})", key.help)
     return code(key.name), expected, _default(key.value, key.required), sentence(meaning)
 
