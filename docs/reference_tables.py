@@ -199,9 +199,10 @@ def body_table() -> str:
     parts: dict[str, dict[str, None]] = {}
     for path in (path for sheet in sheets.values() for path in sheet):
         parts.setdefault(_part_of_sheet(path), {})[path] = None
-    fitted_table = table(("sensor", "bodies"), [(code(name), ", ".join(names)) for name, names in sensors.items()])
+    items = (_wrapped(f"- {code(name)}: {', '.join(names)}") for name, names in sensors.items())
+    fitted = "\n".join(["Bodies by sensor:\n", *items, ""])
     by_part = {part: _part_table(part, list(paths), sheets) for part, paths in parts.items()}
-    return "\n".join([by_part.pop(""), fitted_table, *by_part.values()])
+    return "\n".join([by_part.pop(""), fitted, *by_part.values()])
 
 
 def _part_of_sheet(path: str) -> str:
@@ -213,7 +214,7 @@ def _part_of_sheet(path: str) -> str:
 def _part_table(part: str, paths: list[str], sheets: dict[str, dict[str, str]]) -> str:
     """The figures of a part, with a column for the bodies that have the same; none for bodies without figures.
 
-    Keys end in their unit.
+    Figures of bodies of one column alone follow in a line for these. Keys end in their unit.
     """
     columns: dict[tuple[str, ...], list[str]] = {}
     for name, sheet in sheets.items():
@@ -221,7 +222,16 @@ def _part_table(part: str, paths: list[str], sheets: dict[str, dict[str, str]]) 
             columns.setdefault(tuple(sheet.get(path, "") for path in paths), []).append(code(name))
     head = [code(f"[{part}]") if part else "figure", *(", ".join(names) for names in columns.values())]
     names = [code(path.removeprefix(f"{part}.")) for path in paths]
-    return table(head, zip(names, *columns, strict=True))
+    rows, alone = list[tuple[str, ...]](), dict[int, list[str]]()
+    for name, *figures in zip(names, *columns, strict=True):
+        filled = [column for column, figure in enumerate(figures) if figure]
+        if len(filled) == 1:
+            alone.setdefault(filled[0], []).append(f"{name} {figures[filled[0]]}")
+        else:
+            rows.append((name, *figures))
+    label = "Only" if rows else f"{head[0]} of"
+    lines = [_wrapped(f"{label} {head[column + 1]}: {'; '.join(figures)}.") + "\n" for column, figures in alone.items()]
+    return "\n".join([*([table(head, rows)] if rows else []), *lines])
 
 
 def _figures(body: CatalogueEntry) -> dict[str, CatalogueParameter]:
@@ -410,8 +420,9 @@ def _item(name: str, expected: str, default: str, meaning: str) -> str:
 
 
 def _wrapped(item: str) -> str:
-    """An item of a list; in one line where a part of it would be Markdown of its own at the start of a line."""
-    lines = wrap(item.strip(), WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    """An item or a paragraph; in one line where a part of it would be Markdown of its own at the start of a line."""
+    indent = "  " if item.startswith("- ") else ""
+    lines = wrap(item.strip(), WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     return item.strip() if any(MARKUP.match(line) for line in lines[1:]) else "\n".join(lines)
 
 
