@@ -27,7 +27,7 @@ SETTING = re.compile(r"(\w+ = .+) in (\[.+\])")  # 'kind = "wheels" in [drive]'
 ONLY_WITH = re.compile(r"\(only with \w+ = ([^)]+)\)")  # behind the help of a key of some choices
 MARKUP = re.compile(r" *([-+*>#|=~]|\d+[.)])")
 ONLY = re.compile(r"(.+ only): ")  # before the help of a key of some models
-CHOICES = re.compile(r"one of ([\w.-]+(?:, [\w.-]+)*)")
+CHOICES = re.compile(r"one of ([\w.-]+(?:, [\w.-]+)*)|(?!true or false)([a-z]\w*(?: or [a-z]\w*)+)")
 NUMBER = r"(-?[\d.e+-]+)"
 RANGES = {  # texts of `expected` as regular expressions, and what replaces them
     rf"\ba (whole )?number of at least {NUMBER} and at most {NUMBER}": r"\1\2 to \3",
@@ -446,7 +446,8 @@ def body_key_list(sheet_table: str = "") -> str:
 def _expected(key: CatalogueParameter) -> str:
     """Accepted values of a key: ranges in symbols, texts to choose from as TOML has them."""
     if choices := CHOICES.fullmatch(key.expected):
-        return f"one of {', '.join(code(toml(choice)) for choice in choices[1].split(', '))}"
+        names = (choices[1] or choices[2]).replace(" or ", ", ").split(", ")
+        return f"one of {', '.join(code(toml(name)) for name in names)}"
     expected = key.expected
     for words, symbols in RANGES.items():
         expected = re.sub(words, symbols, expected)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swarmwire.comms.base.arrays import AnyArray, BoolArray, FloatArray, IntArray
+from swarmwire.comms.base.arrays import BoolArray, FloatArray, IntArray
 from swarmwire.comms.base.geometry.floor import Floor
 from swarmwire.comms.base.geometry.shapes import Boundary, Obstacle
 from swarmwire.comms.radio.records import PacketCounts, ReceptionRecords, TransmissionRecords
@@ -63,7 +63,7 @@ class Static:
         """Number of obstacles in each arena that robots can push."""
         return sum(obstacle.movable for obstacle in self.obstacles[0])
 
-    def movable_at(self, arena: int, pose: AnyArray) -> tuple[Obstacle, ...]:
+    def movable_at(self, arena: int, pose: FloatArray) -> tuple[Obstacle, ...]:
         """Return the movable obstacles of an arena at poses (k, 3)."""
         movable = (obstacle for obstacle in self.obstacles[arena] if obstacle.movable)
         return tuple(obstacle.put_at(*row) for obstacle, row in zip(movable, pose.tolist(), strict=True))
