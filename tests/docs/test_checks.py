@@ -40,7 +40,7 @@ def test_generated_table_out_of_date_is_a_problem(page: Path):
     page.write_text("<!-- reference: fates -->\n<!-- /reference -->\n")
     assert len(list(checks.generated_tables())) == 1
     page.write_text(filled(page.read_text(), "docs/page.md"))
-    assert "| `received` |" in page.read_text()
+    assert "- `received`: " in page.read_text()
     assert list(checks.generated_tables()) == []
     page.write_text("<!-- reference: no-such-table -->\n<!-- /reference -->\n")
     with pytest.raises(BadInput, match="expected one of"):
