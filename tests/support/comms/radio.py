@@ -1,6 +1,6 @@
 """Radios without a world: media, traffic, bursts, measured values."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pkgutil import iter_modules
 from typing import Any
@@ -15,7 +15,7 @@ from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
-from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT
 from swarmwire.comms.base.threads import Threads
 from swarmwire.comms.radio import config
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Bursts, Measures, RangeMeasure, RssiMeasure
@@ -23,7 +23,7 @@ from swarmwire.comms.radio.config.path_loss_models import LogDistance
 from swarmwire.comms.radio.config.phy import Access, Bodies, Fading, ReceiverNoise, Reception, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
-from swarmwire.comms.radio.disruption import Disruption
+from swarmwire.comms.radio.disruption import Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.radio.records import PacketCounts
 from swarmwire.comms.radio.results import Results
@@ -166,13 +166,23 @@ def make_medium(
 
 
 def run(
-    medium: RadioMedium, pose: FloatArray, sent_in: Callable[[int], SentPackets], ticks: int, quiet_ticks: int = 0
+    medium: RadioMedium,
+    pose: FloatArray,
+    sent_in: Callable[[int], SentPackets],
+    ticks: int,
+    quiet_ticks: int = 0,
+    now: Mapping[int, Disruption] | None = None,
+    radios: Mapping[int, Radio] | None = None,
 ) -> Run:
-    """Ticks in the loop's order with robots at rest, then quiet ones, then the end."""
-    out = Run(medium)
+    """Ticks in the loop's order with robots at rest, then quiet ones, then the end.
+
+    `now` holds the disruptions, and `radios` other parameters, by the tick from which they hold.
+    """
+    out, current = Run(medium), Disruption.none(len(pose))
     for tick in range(ticks + quiet_ticks + 1):
         at_ns = tick_start_ns(tick, RATE_HZ)
-        out.news.append(medium.step(at_ns, pose))
+        current = (now or {}).get(tick, current)
+        out.news.append(medium.step(at_ns, pose, current, (radios or {}).get(tick)))
         if tick < ticks:
             medium.send(at_ns, tick, sent_in(tick))
     out.last = medium.end()
@@ -182,6 +192,18 @@ def run(
 def living(alive: Sequence[bool]) -> Disruption:
     """Only these robots are alive (rows,), and nothing else is disrupted."""
     return replace(Disruption.none(len(alive)), alive=np.array(alive))
+
+
+def jammers(*rows: dict[str, Any]) -> Jammers:
+    """Jammers in the first arena, always on at the origin at 20 dBm unless they say otherwise."""
+    usual = {"arena": 0, "carrier": NO_ROBOT, "x_m": 0.0, "y_m": 0.0, "power_dbm": 20.0, "on_ns": 10**9}
+    full = [{**usual, "period_ns": 10**9, "phase_ns": 0, **row} for row in rows]
+    return Jammers._make(np.array([row[name] for row in full]) for name in Jammers._fields)
+
+
+def jammed_by(held: Jammers, rows: int) -> Disruption:
+    """Only these jammers disrupt."""
+    return replace(Disruption.none(rows), jammers=held)
 
 
 def packets(sender: Sequence[int], to: Sequence[int] | int = BROADCAST, size: Sequence[int] | int = 10) -> SentPackets:
@@ -227,14 +249,7 @@ def run_disrupted(
     medium: RadioMedium, pose: FloatArray, sent: dict[int, SentPackets], now: dict[int, Disruption], ticks: int
 ) -> Run:
     """What is sent, and what holds from then on, by tick."""
-    out, current = Run(medium), Disruption.none(len(pose))
-    for tick in range(ticks):
-        at_ns = tick_start_ns(tick, RATE_HZ)
-        current = now.get(tick, current)
-        out.news.append(medium.step(at_ns, pose, current))
-        medium.send(at_ns, tick, sent.get(tick, SentPackets.none()))
-    out.last = medium.end()
-    return out
+    return run(medium, pose, lambda tick: sent.get(tick, SentPackets.none()), ticks - 1, now=now)
 
 
 class BurstLinks:
@@ -275,8 +290,12 @@ def fates_of_frames(
 
 def trace_of(quantity: Quantity, rows: Sequence[Row]) -> LinkTrace:
     """The trace of rows (tick, sender, receiver, value)."""
-    tick, sender, receiver, value = (np.array(column) for column in zip(*rows, strict=True))
-    time_ns = np.round(tick * TICK_NS).astype(np.int64)
+    return trace_in_ns(quantity, [(round(tick * TICK_NS), *others) for tick, *others in rows])
+
+
+def trace_in_ns(quantity: Quantity, rows: Sequence[tuple[float, ...]]) -> LinkTrace:
+    """The trace of rows (time in ns, sender, receiver, value)."""
+    time_ns, sender, receiver, value = (np.array(column) for column in zip(*rows, strict=True))
     return link_trace(quantity, TRIO, time_ns, sender, receiver, value.astype(np.float64))
 
 

@@ -12,10 +12,8 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.obstacle_index import ObstacleIndices
 from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
-from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.analysis.coverage import RadioCoverage, coverage_map
 from swarmwire.comms.radio.config.antennas import Antenna, Antennas, GainTable, Pattern, RobotAntenna
 from swarmwire.comms.radio.config.checks import check_radio
@@ -35,12 +33,15 @@ from tests.support.comms.radio import (
     Run,
     at,
     everybody,
+    jammed_by,
+    jammers,
     packets,
     run,
     scattered,
     story,
     with_access,
 )
+from tests.support.refusals import refused_input
 
 POWER_DBM = 60.0  # enough for a link between the backs of two antennas
 RADIO = replace(
@@ -69,14 +70,14 @@ def strengths_dbm(
     radio: Radio, poses: Sequence[FloatArray], groups: Sequence[RobotAntenna | None] = (None, OMNIDIRECTIONAL)
 ) -> FloatArray:
     """Strength from robot 0 to robot 1, and back, at each pose, (k, 2)."""
-    result = Run(medium_of(radio, groups))
-    for tick in range(len(poses) + 1):
-        result.news.append(result.medium.step(tick * TICK_NS, poses[min(tick, len(poses) - 1)]))
-        if tick < len(poses):
-            result.medium.send(tick * TICK_NS, tick, packets([0, 1]))
-    sender, receiver = result.received("sender_index"), result.received("receiver")
-    rssi_dbm = result.measured("rssi_dbm")
-    return np.column_stack([rssi_dbm[(sender == s) & (receiver == 1 - s)] for s in (0, 1)])
+    medium, measured = medium_of(radio, groups), list[list[float]]()
+    for pose in poses:
+        result = run(medium, pose, lambda _: packets([0, 1]), 1)
+        links = result.rows("received", "sender_index", "receiver")
+        rssi_dbm = dict(zip(links, result.measured("rssi_dbm").tolist(), strict=True))
+        measured.append([rssi_dbm[0, 1], rssi_dbm[1, 0]])
+        medium = medium_of(radio, groups)
+    return np.array(measured)
 
 
 def turned(*headings_deg: float) -> list[FloatArray]:
@@ -254,18 +255,12 @@ def test_pattern_of_a_group_replaces_that_of_the_radio():
 
 def test_pattern_keeps_the_gains_of_events_and_follows_ramps():
     radio, pose = patterned(PATCH), turned(30)[0]
-    medium, now = medium_of(radio, (None, OMNIDIRECTIONAL)), Disruption.none(2)
+    now, usual = Disruption.none(2), float(strengths_dbm(radio, [pose])[0, 0])
     now.send_gain_db[:] = 5.0, 0.0
     now.receive_gain_db[:] = 0.0, -2.0
-    result, usual = Run(medium), float(strengths_dbm(radio, [pose])[0, 0])
-    result.news.append(medium.step(0, pose))
-    medium.send(0, 0, packets([0]))
-    result.news.append(medium.step(TICK_NS, pose, now))
-    medium.send(TICK_NS, 1, packets([0]))
-    mounted = with_number(radio, "radio.antenna.pattern.azimuth_deg", -30.0)
-    result.news.append(medium.step(2 * TICK_NS, pose, now, mounted))
-    medium.send(2 * TICK_NS, 2, packets([0]))
-    result.news.append(medium.step(3 * TICK_NS, pose))
+    mounted = {2: with_number(radio, "radio.antenna.pattern.azimuth_deg", -30.0)}
+    medium = medium_of(radio, (None, OMNIDIRECTIONAL))
+    result = run(medium, pose, lambda _: packets([0]), 3, now={1: now}, radios=mounted)
     more_db = 12.0 * (30.0 / 65.0) ** 2
     expected_dbm = [usual, usual + 3.0, usual + 3.0 + more_db]
     np.testing.assert_allclose(result.measured("rssi_dbm"), expected_dbm, atol=1e-9)
@@ -283,17 +278,12 @@ def test_pattern_sees_headings_of_interpolated_positions():
     assert result.measured("rssi_dbm").tolist() == pytest.approx([expected_dbm], abs=1e-9)
 
 
-def receives(radio: Radio, pose: FloatArray, senders: Sequence[int], jammers: Jammers | None = None) -> bool:
+def receives(radio: Radio, pose: FloatArray, senders: Sequence[int], held: Jammers | None = None) -> bool:
     """Whether robot 0 receives what robot 1 sends while others send, too; robot 0 alone has the pattern."""
-    medium, now = medium_of(radio, [None, *[OMNIDIRECTIONAL] * (len(pose) - 1)]), Disruption.none(len(pose))
-    now.jammers = jammers or Jammers.none()
-    result = Run(medium)
-    for tick in range(3):
-        result.news.append(medium.step(tick * TICK_NS, pose, now))
-        if tick == 0:
-            medium.send(0, 0, packets(senders))
-    links = result.rows("received", "sender_index", "receiver")
-    return (1, 0) in links
+    medium = medium_of(radio, [None, *[OMNIDIRECTIONAL] * (len(pose) - 1)])
+    now = {0: jammed_by(held or Jammers.none(), len(pose))}
+    result = run(medium, pose, lambda _: packets(senders), 1, 1, now)
+    return (1, 0) in result.rows("received", "sender_index", "receiver")
 
 
 ALOHA = replace(
@@ -311,9 +301,8 @@ def test_patch_that_looks_away_from_an_interferer_receives():
 
 @pytest.mark.parametrize(("x_m", "is_received"), [(-2.0, True), (2.0, False)])
 def test_patch_that_looks_away_from_a_jammer_receives(x_m: float, is_received: bool):
-    row = {"arena": 0, "carrier": NO_ROBOT, "x_m": x_m, "y_m": 0.0, "power_dbm": 10.0, "on_ns": 10**9}
-    jammers = Jammers._make(np.array([{**row, "period_ns": 10**9, "phase_ns": 0}[name]]) for name in Jammers._fields)
-    assert receives(ALOHA, at((0, 0), (2, 0.1)), [1], jammers) is is_received
+    held = jammers({"x_m": x_m, "power_dbm": 10.0})
+    assert receives(ALOHA, at((0, 0), (2, 0.1)), [1], held) is is_received
 
 
 def test_radio_graph_joins_patches_that_face_each_other_alone():
@@ -365,6 +354,5 @@ def test_coverage_of_a_patch_is_that_of_the_medium():
     ],
 )
 def test_pattern_with_keys_that_contradict_is_refused(key: str, pattern: Pattern):
-    with pytest.raises(BadInput) as error:
+    with refused_input("a.toml", f"radio.antenna.pattern.{key}"):
         check_radio(patterned(pattern), "a.toml")
-    assert (error.value.where, error.value.key) == ("a.toml", f"radio.antenna.pattern.{key}")

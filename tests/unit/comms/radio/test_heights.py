@@ -10,21 +10,19 @@ import pytest
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.geometry.shapes import Obstacle
-from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure, RssiMeasure
 from swarmwire.comms.radio.config.path_loss_models import SPEED_OF_LIGHT_MPS, LogDistance, TwoRay
 from swarmwire.comms.radio.config.phy import Bodies, Fading, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.context import ChannelContext
-from swarmwire.comms.radio.disruption import Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
 from tests.support.comms.radio import (
     RATE_HZ,
-    TICK_NS,
-    Run,
     at,
     everybody,
     in_air,
+    jammed_by,
+    jammers,
     make_medium,
     packets,
     run,
@@ -69,9 +67,8 @@ def test_heights_make_range_and_delay_those_in_space_and_bearing_that_in_the_pla
     result = run(make_medium(radio, 2), pose, lambda _: packets([0]), 1)
     assert result.measured("range_m").tolist() == [5.0]
     assert result.measured("bearing_rad").tolist() == [-pi / 2]
-    late_ns = result.received("received_at_ns") - run(
-        make_medium(replace(radio, propagation_mps=None), 2), pose, lambda _: packets([0]), 1
-    ).received("received_at_ns")
+    at_once = run(make_medium(replace(radio, propagation_mps=None), 2), pose, lambda _: packets([0]), 1)
+    late_ns = result.received("received_at_ns") - at_once.received("received_at_ns")
     assert late_ns.tolist() == [50_000_000]
     assert not hears(replace(radio, range_m=4.999), pose)
     assert hears(replace(radio, range_m=3.0), at((0, 0), (0, 3)))
@@ -118,21 +115,17 @@ def test_heights_equal_for_all_robots_change_nothing():
         ((0.5, 1.5), 0.5, True),  # 1.2 m
         ((0.5, 1.5), -0.5, False),
         ((0.0, 2.2), 0.0, True),  # 0.99 m above the floor at the wall's low side, but the wall is 0.98 m high
+        ((1e6, 1e6), 0.0, False),  # the wall is endless
     ],
 )
 def test_heights_of_drones_decide_if_they_see_one_another_over_a_wall(
     heights_m: tuple[float, float], wall_x_m: float, is_seen: bool
 ):
-    top_m = 0.98 if heights_m[1] == 2.2 else 1.0
+    top_m = {2.2: 0.98, 1e6: float("inf")}.get(heights_m[1], 1.0)
     wall = replace(WALL, x_m=wall_x_m, height_m=top_m)
     assert hears(IN_SIGHT, in_air((-1, 0, heights_m[0]), (1, 0, heights_m[1])), [wall]) is is_seen
     phy = replace(with_access("none"), line_of_sight=True)
     assert hears(phy, in_air((1, 0, heights_m[1]), (-1, 0, heights_m[0])), [wall]) is is_seen
-
-
-def test_heights_above_every_obstacle_do_not_exist_without_a_top():
-    endless = replace(WALL, height_m=float("inf"))
-    assert not hears(IN_SIGHT, in_air((-1, 0, 1e6), (1, 0, 1e6)), [endless])
 
 
 def test_heights_shorten_the_way_through_a_wall():
@@ -201,14 +194,8 @@ def test_heights_of_two_ray_are_equal_both_ways_with_two_different_antennas():
 
 def jammed(pose: FloatArray, jammer: dict[str, float], radio: Radio, obstacles: Sequence[Obstacle] = ()) -> bool:
     """Whether robot 1 misses what robot 0 sends, next to a jammer of 20 dBm that is always on."""
-    usual = {"arena": 0, "carrier": NO_ROBOT, "x_m": 0.0, "y_m": 0.0, "power_dbm": 20.0, "on_ns": 10**9}
-    row = {**usual, "period_ns": 10**9, "phase_ns": 0, **jammer}
-    result, now = Run(make_medium(radio, len(pose), obstacles=[obstacles])), Disruption.none(len(pose))
-    now.jammers = Jammers._make(np.array([row[name]]) for name in Jammers._fields)
-    for tick in range(3):
-        result.news.append(result.medium.step(tick * TICK_NS, pose, now))
-        if tick == 0:
-            result.medium.send(0, 0, packets([0], 1))
+    medium, now = make_medium(radio, len(pose), obstacles=[obstacles]), {0: jammed_by(jammers(jammer), len(pose))}
+    result = run(medium, pose, lambda _: packets([0], 1), 1, 1, now)
     assert ([0, 1] in result.edges.tolist()) == ("RECEIVED" in result.fates())
     return "RECEIVED" not in result.fates()
 

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.base.threads import WORTH_ROWS
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Delays, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
@@ -31,6 +32,7 @@ from tests.support.comms.radio import (
     packets,
     random_traffic,
     run,
+    run_disrupted,
     scattered,
     story,
     with_access,
@@ -262,15 +264,12 @@ def test_order_of_delayed_packets_is_independent_of_advance(radio: Radio, seed: 
 def test_reception_ended_by_a_disruption_delays_no_other():
     """The radio of robot 0 is off while first packets are on their way to it; second ones come in their own time."""
     radio = Radio(9.0, send_offset="tick", delays=Delays("uniform", 0.5, 0.28))
+    sent, off = dict.fromkeys((0, 2), packets(range(1, 12))), Disruption.none(12)
+    off.radio_on[0] = False
     times: list[dict[tuple[int, int], int]] = []
     for variant in (radio, in_order(radio)):
-        result, pose = Run(make_medium(variant, 12)), scattered(12)
-        for tick in range(14):
-            now = Disruption.none(12)
-            now.radio_on[0] = tick != 1
-            result.news.append(result.medium.step(tick_start_ns(tick, RATE_HZ), pose, now))
-            if tick in (0, 2):
-                result.medium.send(tick_start_ns(tick, RATE_HZ), tick, packets(range(1, 12)))
+        now = {1: off, 2: Disruption.none(12)}
+        result = run_disrupted(make_medium(variant, 12), scattered(12), sent, now, 14)
         rows = result.rows("received", "receiver", "sender_index", "sequence", "received_at_ns")
         times.append({(sender, sequence): at_ns for to, sender, sequence, at_ns in rows if to == 0})
     free, ordered = times
@@ -280,8 +279,42 @@ def test_reception_ended_by_a_disruption_delays_no_other():
     assert ordered.keys() == free.keys()
 
 
-def test_order_kept_under_even_delays_changes_nothing():
-    radio = Radio(9.0, latency_s=0.2, delays=Delays("uniform", 0.01, 1e-9))
-    pose = scattered(4)
-    free, ordered = (run(make_medium(variant, 4), pose, everybody(4), 4, 4) for variant in (radio, in_order(radio)))
-    np.testing.assert_array_equal(free.received("received_at_ns"), ordered.received("received_at_ns"))
+MANY, FEW = 150, 8  # robots
+
+
+def all_columns(medium: RadioMedium, poses: list[FloatArray]) -> list[AnyArray]:
+    """All columns of what was received, every fate and every edge, tick by tick, while everybody sends."""
+    columns: list[AnyArray] = []
+    for tick, pose in enumerate(poses):
+        news = medium.step(tick_start_ns(tick, RATE_HZ), pose)
+        medium.send(tick_start_ns(tick, RATE_HZ), tick, everybody(len(pose))(tick))
+        received, links = news.received, news.finished
+        columns += [received.receiver, received.sender_index, received.sequence, received.received_at_ns]
+        columns += [links.arena, links.receiver, links.sender, links.sequence, links.fate, links.final_at_ns]
+        columns += [np.nan_to_num(links.rssi_dbm), news.edges, news.tally.fates, *received.measured.values()]
+    return columns
+
+
+def test_links_of_a_phy_are_equal_with_any_number_of_threads():
+    """Of so many robots that their links are worth another thread."""
+    rng = np.random.default_rng(3)
+    poses = [scattered(MANY) + rng.normal(0.0, 0.1, (MANY, 3)) for _ in range(4)]
+    assert MANY * (MANY - 1) // 2 > WORTH_ROWS
+    radio = drawing("csma-802154")
+    alone, threaded = (all_columns(make_medium(radio, MANY, threads=threads), poses) for threads in (1, 3))
+    assert sum(map(len, alone)) > WORTH_ROWS
+    assert all(map(np.array_equal, alone, threaded))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_links_of_a_phy_kept_equal_links_computed_anew(method: str):
+    """A robot out of everybody's reach moves, or does not, while all others stand."""
+    poses = [scattered(FEW) for _ in range(8)]
+    for pose in poses:
+        pose[-1, :2] = 1e5
+    stand = all_columns(make_medium(drawing(method), FEW), poses)
+    for tick, pose in enumerate(poses):
+        pose[-1, 0] += tick
+    moved = all_columns(make_medium(drawing(method), FEW), poses)
+    assert sum(map(len, stand)) > 0
+    assert all(map(np.array_equal, stand, moved))

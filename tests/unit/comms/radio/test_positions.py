@@ -48,12 +48,6 @@ def moved(medium: RadioMedium, poses: Sequence[FloatArray], sent_ns: Sequence[in
     return result
 
 
-def test_positions_held_are_those_at_the_start_of_the_tick():
-    poses = [at((0, 0), (x, 0)) for x in (4.5, 5.5, 6.5)]
-    result = moved(make_medium(replace(DISK, positions="held"), 2), poses, MIDDLES_NS)
-    assert result.measured("range_m").tolist() == [4.5] * 10
-
-
 def test_positions_interpolated_are_on_the_line_between_two_poses():
     """From 4.5 m to 5.5 m in a tick: the packets of its first half are received, at the distance of their tenth."""
     poses = [at((0, 0), (x, 0)) for x in (4.5, 5.5, 6.5)]

@@ -19,7 +19,6 @@ from swarmwire.comms.radio.config.antennas import Antenna
 from swarmwire.comms.radio.config.frames import acknowledgement_ns, airtime_ns
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.phy import Access, Fading, Shadowing, Walls
-from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.phy.propagation import cut_off_dbm, range_of, receiver_for, sensitivity_of
 from swarmwire.comms.radio.propagation.path_loss import loss_db
@@ -27,6 +26,7 @@ from swarmwire.comms.radio.reception.receiver import chunk_success
 from tests.support.comms.radio import (
     IEEE_802_15_4,
     MODULES,
+    OBSTACLES,
     SIZE_M,
     at,
     everybody,
@@ -45,7 +45,6 @@ PARAMETERS = {
     for value in vars(import_module(module)).values()
     if isinstance(value, type) and is_dataclass(value) and value.__module__ == module
 }
-OBSTACLES = [Obstacle("cylinder", 0.5, 0.5, radius_m=0.4), Obstacle("box", -1.0, -1.0, 0.3, size_m=(1.5, 0.4))]
 DISK = Radio(2.5, loss=0.1, bursts=Bursts(1.0, 9.0))
 # So weak that a few metres decide.
 WEAK = replace(IEEE_802_15_4, antenna=Antenna(-42.0), access=Access("none"), min_delivery=0.3)
@@ -185,14 +184,6 @@ def test_acoustic_fading_uses_its_own_wavelength():
     assert strengths[0] == strengths[1]
 
 
-def test_ble_advertisements_on_one_channel_collide_as_in_pure_aloha():
-    """9 others, each on air 376 us in 10 ms: received if none starts 376 us before or after; 800 packets x 9."""
-    radio = preset("ble-1M", advertising={"channels": 1, "max_delay_s": 0.0})
-    measured = in_one_spot(radio, 10, 27, 0.01, runs=20)
-    assert measured.packets == 800
-    assert measured.pdr == pytest.approx((1.0 - 2.0 * 0.0376) ** 9, abs=0.05)
-
-
 def test_kilobot_listens_before_it_sends():
     """20 in one spot, twice a second, as Kilobots do: without carrier sense a fifth would be lost."""
     measured = in_one_spot(preset("kilobot"), 20, 11, 0.5, runs=20)
@@ -210,10 +201,6 @@ def test_acoustic_modems_that_send_at_once_hear_nothing():
     together = in_one_spot(replace(preset("acoustic"), send_offset="tick"), 2, 4, 1.0, runs=2)
     assert together.pdr == 0.0
     assert 0.2 < in_one_spot(preset("acoustic"), 2, 4, 1.0, runs=20).pdr < 0.6
-
-
-def test_presets_list_their_differences():
-    assert all(PRESETS[name].differences for name in NEW)
 
 
 @pytest.mark.parametrize("kind", sorted(PARAMETERS, key=lambda kind: kind.__name__))

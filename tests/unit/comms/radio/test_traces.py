@@ -12,7 +12,7 @@ from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.phy import Fading, Shadowing
 from swarmwire.comms.radio.config.radio import Radio, Trace
-from swarmwire.comms.radio.traces import LinkTraces, RefusedRow, link_trace
+from swarmwire.comms.radio.traces import LinkTraces, RefusedRow
 from swarmwire.comms.robot.packets import Fate
 from tests.support.comms.radio import (
     METHODS,
@@ -28,6 +28,7 @@ from tests.support.comms.radio import (
     random_traffic,
     run,
     scattered,
+    trace_in_ns,
     trace_of,
     with_access,
 )
@@ -41,11 +42,6 @@ ALONE = with_access("none")
 BOTH = [(0.0, s, r, -60.0) for s in range(3) for r in range(3) if s != r]
 
 
-def trace(rows, quantity="delivery_ratio"):
-    time_ns, sender, receiver, value = (np.array(column) for column in zip(*rows, strict=True))
-    return link_trace(quantity, ROBOTS, time_ns, sender, receiver, value.astype(float))
-
-
 def value(link_trace_, sender: int, receiver: int, at_ns: int) -> float:
     return float(link_trace_.values_at(np.array([sender]), np.array([receiver]), np.array([at_ns]))[0])
 
@@ -57,7 +53,7 @@ def value(link_trace_, sender: int, receiver: int, at_ns: int) -> float:
 def test_trace_values_equal_a_search_of_the_rows(drawn, at_ns):
     latest = {(t, s, (s + d) % ROBOTS): v for t, s, d, v in drawn}
     rows = [(*key, v) for key, v in sorted(latest.items())]
-    measured = trace(rows)
+    measured = trace_in_ns("delivery_ratio", rows)
     for s in range(ROBOTS):
         for r in range(ROBOTS):
             before = [v for t, sender, receiver, v in rows if (sender, receiver) == (s, r) and t <= at_ns]
@@ -81,7 +77,7 @@ def test_trace_values_equal_a_search_of_the_rows(drawn, at_ns):
 )
 def test_trace_row_that_is_impossible_is_refused(quantity, row, message):
     with pytest.raises(RefusedRow, match=f"^{re.escape(message)}"):
-        trace([(0, 0, 1, 0.5), row], quantity)
+        trace_in_ns(quantity, [(0, 0, 1, 0.5), row])
 
 
 def replayed(

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.radio.config.antennas import Antenna, Antennas, RobotAntenna
 from swarmwire.comms.radio.config.impairments import Bursts, Measures, RangeMeasure
@@ -28,6 +27,7 @@ from tests.support.comms.radio import (
     everybody,
     make_medium,
     packets,
+    run,
     scattered,
     with_access,
 )
@@ -35,7 +35,7 @@ from tests.support.comms.radio import (
 PAIR = at((0, 0), (1, 0))
 LOSSY = Radio(2.0, loss=0.4, latency_s=0.01, jitter_s=0.02, measures=Measures(range=RangeMeasure(0.1)))
 RADIO = Antenna(10.0, 2.0)
-Change = Callable[[Disruption], Radio | None]
+Change = Callable[[Disruption], None]
 FEW = scattered(8) * [20.0, 20.0, 1.0]
 # Ten bytes and 17 of overhead take about 77 ms.
 SLOW = {"bit_rate_bps": 2800, "queue_limit": 4}
@@ -48,27 +48,19 @@ def ran(
     sent: Callable[[int], SentPackets],
     changes: dict[int, Change],
     ticks: int = 16,
+    radios: dict[int, Radio] | None = None,
 ) -> Run:
     """Changes are made before the tick that they are listed under."""
-    result, held = Run(medium), Disruption.none(len(pose))
-    for tick in range(ticks + 1):
-        radio = changes.get(tick, lambda _: None)(held)
-        coming = replace(held)
-        result.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, coming, radio))
-        if tick < ticks:
-            medium.send(tick_start_ns(tick, RATE_HZ), tick, sent(tick))
-    result.last = medium.end()
-    return result
-
-
-def another(radio: Radio) -> Change:
-    return lambda _: radio
+    held, now = Disruption.none(len(pose)), dict[int, Disruption]()
+    for tick in sorted(changes):
+        changes[tick](held)
+        now[tick] = replace(held)
+    return run(medium, pose, sent, ticks, now=now, radios=radios)
 
 
 def tuned(radio: Radio, changes: dict[int, Radio], robots: int = 8) -> Run:
     """Everybody broadcasts in each tick; the radio is another one from some ticks on."""
-    others = {tick: another(other) for tick, other in changes.items()}
-    return ran(make_medium(radio, robots), scattered(robots), everybody(robots), others, ticks=20)
+    return run(make_medium(radio, robots), scattered(robots), everybody(robots), 20, radios=changes)
 
 
 def links(result: Run, first_s: float = 0.0, stop_s: float = 9.0) -> list[tuple[float, ...]]:
@@ -126,13 +118,8 @@ def test_tune_of_burst_loss_keeps_links_in_their_burst():
 def test_tune_keeps_airtime_of_packets_handed_over_before():
     """Ten bytes take 80 ms at first, 40 ms from 0.1 s on."""
     slow = Radio(2.0, bit_rate_bps=1000, send_offset="tick")
-    medium = make_medium(slow, 2)
-    result = Run(medium)
-    for tick in range(6):
-        fast = replace(slow, bit_rate_bps=2000) if tick == 1 else None
-        result.news.append(medium.step(tick_start_ns(tick, RATE_HZ), PAIR, radio=fast))
-        if tick < 2:
-            medium.send(tick_start_ns(tick, RATE_HZ), tick, packets([0, 0, 0]))
+    fast = {1: replace(slow, bit_rate_bps=2000)}
+    result = run(make_medium(slow, 2), PAIR, lambda _: packets([0, 0, 0]), 2, 3, radios=fast)
     assert (result.on_air("on_air_at_ns") // 1_000_000).tolist() == [0, 80, 160, 240, 280, 320]
 
 
@@ -196,27 +183,23 @@ def everything(method: str) -> Radio:
 @pytest.mark.parametrize("method", METHODS)
 def test_tune_to_equal_parameters_changes_nothing(method: str):
     radio = everything(method)
-    same: dict[int, Change] = {tick: another(replace(radio)) for tick in range(1, 16)}
-    plain = ran(make_medium(radio, 8), FEW, everybody(8), {})
-    assert links(ran(make_medium(radio, 8), FEW, everybody(8), same)) == links(plain)
-    gains: dict[int, Change] = {3: gained(1.0), 4: gained(0.0)}
-    apart, silent = (
-        ran(
-            make_medium(radio, 8),
-            FEW,
-            lambda tick: SentPackets.none() if tick in (2, 3, 4) else everybody(8)(0),
-            changes,
-        )
-        for changes in (gains, {})
-    )
-    assert links(apart) == links(silent)
+
+    def ended(sent: Callable[[int], SentPackets], changes: dict[int, Change], radios: dict[int, Radio]):
+        return links(ran(make_medium(radio, 8), FEW, sent, changes, radios=radios))
+
+    def pausing(tick: int) -> SentPackets:
+        return SentPackets.none() if tick in (2, 3, 4) else everybody(8)(0)
+
+    same = {tick: replace(radio) for tick in range(1, 16)}
+    assert ended(everybody(8), {}, same) == ended(everybody(8), {}, {})
+    assert ended(pausing, {3: gained(1.0), 4: gained(0.0)}, {}) == ended(pausing, {}, {})
 
 
 @pytest.mark.parametrize("method", ["none", "aloha"])
 def test_tune_of_a_phy_applies_to_packets_after_the_change_only(method: str):
     radio = everything(method)
     other = replace(radio, antenna=Antenna(-25.0), noise=ReceiverNoise(5e6, 3.0), loss=0.3)
-    changed = ran(make_medium(radio, 8), FEW, everybody(8), {8: another(other)})
+    changed = ran(make_medium(radio, 8), FEW, everybody(8), {}, radios={8: other})
     assert links(changed, 0.0, 0.79) == links(ran(make_medium(radio, 8), FEW, everybody(8), {}), 0.0, 0.79)
     alone = ran(make_medium(other, 8), FEW, everybody(8), {})
     assert links(changed, 0.85, 9.0) == links(alone, 0.85, 9.0)
@@ -227,9 +210,8 @@ def test_tune_of_a_phy_applies_to_packets_after_the_change_only(method: str):
 def test_tune_of_noise_applies_within_a_frame(at_tick: int, received: int):
     """It takes 0.5 s, and the noise rises beyond hope when a tenth, or nine tenths, of it is over."""
     slow = replace(with_access("aloha"), bit_rate_bps=900, max_payload_bytes=60)
-    change = another(replace(slow, noise=ReceiverNoise(5e6, 30.0)))
-    medium, pose = make_medium(slow, 2), at((0, 0), (50, 0))
-    result = ran(medium, pose, lambda tick: packets([0] * (tick == 0), size=40), {at_tick: change})
+    noisy, pose = replace(slow, noise=ReceiverNoise(5e6, 30.0)), at((0, 0), (50, 0))
+    result = run(make_medium(slow, 2), pose, lambda _: packets([0], size=40), 1, 15, radios={at_tick: noisy})
     assert result.fates().get("RECEIVED", 0) == received
 
 
@@ -305,12 +287,8 @@ def test_backlog_of_all_waits_for_the_radio_up_to_the_limit(method: str):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_backlog_of_newest_replaces_the_waiting_packet(method: str):
-    result = ran(
-        make_medium(with_access(method), 2),
-        PHY_PAIR,
-        lambda tick: packets([0] * (tick < 8)),
-        {2: switched(NEWEST, 0), 8: switched(NEWEST)},
-    )
+    medium, changes = make_medium(with_access(method), 2), {2: switched(NEWEST, 0), 8: switched(NEWEST)}
+    result = ran(medium, PHY_PAIR, lambda tick: packets([0] * (tick < 8)), changes)
     assert result.fates() == {"RECEIVED": 3, "BLACKOUT": 5}
     assert result.received("sequence").tolist() == [0, 1, 7]
 

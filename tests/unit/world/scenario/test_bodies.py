@@ -20,7 +20,7 @@ from swarmwire.world.sensors import loading
 from tests.support.refusals import refused_input
 from tests.support.world.scenes import SAMPLE
 
-SIGNAL = {"model": "log-distance"}
+SIGNAL, BLE = {"model": "log-distance"}, {"preset": "ble-1M"}
 BURST_FAULTS: dict[str, list[dict[str, float]]] = {  # by the key below radio.bursts
     "p": [
         {"p": 0.1, "r": 0.5, "interval_s": 0.1, "bad_s": 1.0},
@@ -67,6 +67,15 @@ FAULTS: list[tuple[dict[str, Any], str]] = [
     ({**SIGNAL, "fading": {"distribution": "nakagami", "k": 3.0}}, "radio.fading.k"),
     ({**SIGNAL, "fading": {"distribution": "rician", "m": 1.0}}, "radio.fading.m"),
     ({"preset": "wifi-b-1M", "reception": {"model": "802.15.4"}}, "radio.reception.model"),
+    *(
+        ({"preset": "wifi-a-6M", "access": {key: value}}, f"radio.access.{key}")  # of 802.11n
+        for key, value in (("aggregation_bytes", 100), ("rts_threshold_bytes", 100), ("rate_control", "ideal"))
+    ),
+    ({"preset": "ieee802154", "access": {"station": "ground"}}, "radio.access.station"),
+    ({**BLE, "advertising": {"scan_window_s": 0.04}}, "radio.advertising.scan_window_s"),
+    ({**BLE, "advertising": {"channels": 4}}, "radio.advertising.channels"),
+    ({**BLE, "advertising": {}, "access": {"method": "aloha"}}, "radio.advertising"),
+    ({**BLE, "advertising": {}, "model": "unit-disk", "range_m": 2.0}, "radio.antenna"),
 ]
 
 

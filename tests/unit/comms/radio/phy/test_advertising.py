@@ -17,6 +17,8 @@ from tests.support.comms.radio import (
     Run,
     check_fates,
     everybody,
+    jammed_by,
+    jammers,
     living,
     make_medium,
     packets,
@@ -26,8 +28,6 @@ from tests.support.comms.radio import (
     scattered,
     story,
 )
-from tests.support.refusals import refused_input
-from tests.unit.comms.radio.phy.test_jamming import jammers, ran
 from tests.unit.world.scenario.test_bodies import radio_of
 
 # Any overlap is fatal between equal signals: neither has 6 dB over the other.
@@ -106,6 +106,7 @@ def test_lone_advertiser_is_received_once_by_each_scanner_on_one_of_its_channels
     delivery = len(rows) / (ticks * (robots - 1))
     assert delivery == pytest.approx(1.0 - event_ns / (3 * INTERVAL_NS) if window_s is None else 0.5, abs=0.03)
     assert result.fates() == {"RECEIVED": len(rows), "NOT_LISTENING": ticks * (robots - 1) - len(rows)}
+    assert set(result.departed("off_air_at_ns") - result.departed("on_air_at_ns")) == {3 * AIRTIME_NS}
     check_fates(result)
 
 
@@ -119,11 +120,6 @@ def test_synchronous_advertisers_collide_on_each_channel_as_in_their_definition(
     alone = (1.0 - AIRTIME_NS / DELAY_NS) ** (2 * 14)
     scanner = [row for row in rows if row[2] >= 15]
     assert len(scanner) / (6 * 15 * 5) == pytest.approx(alone, abs=0.1)
-
-
-def test_airtime_is_that_of_all_pdus():
-    result = in_one_spot(ble(), 2, 1, 1)
-    assert (result.departed("off_air_at_ns") - result.departed("on_air_at_ns")).tolist() == [3 * AIRTIME_NS]
 
 
 def disrupted(ticks: int, robots: int) -> dict[int, Disruption]:
@@ -176,22 +172,9 @@ def test_arenas_do_not_interact():
 def test_jammer_drowns_all_channels_while_it_is_on(phase_ns: int):
     """It is on in one half of each tick, and events are in the first half."""
     robots, pulses = 20, jammers({"on_ns": TICK_NS // 2, "period_ns": TICK_NS, "phase_ns": phase_ns})
-    result = ran(make_medium(ble(), robots), np.zeros((robots, 3)), sent_by(1), pulses, 6, 1)
+    now = {0: jammed_by(pulses, robots)}
+    result = run(make_medium(ble(), robots), np.zeros((robots, 3)), lambda _: sent_by(1), 6, now=now)
     met = receptions(robots, 1, 6)
     is_jammed = phase_ns == 0
     assert set(received(result)) == (set() if is_jammed else met)
     assert result.fates().get("JAMMED", 0) == (len(met) if is_jammed else 0)
-
-
-@pytest.mark.parametrize(
-    ("others", "key"),
-    [
-        ({"advertising": {"scan_window_s": 0.04}}, "radio.advertising.scan_window_s"),
-        ({"advertising": {"channels": 4}}, "radio.advertising.channels"),
-        ({"advertising": {}, "access": {"method": "aloha"}}, "radio.advertising"),
-        ({"advertising": {}, "model": "unit-disk", "range_m": 2.0}, "radio.antenna"),
-    ],
-)
-def test_advertising_that_does_not_fit_is_refused(others: dict[str, Any], key: str):
-    with refused_input(key=key):
-        ble(**others)

@@ -8,15 +8,25 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.geometry.shapes import Obstacle
-from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.config.phy import ReceiverNoise, Shadowing, Walls
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import NEWEST, Disruption, Jammers
 from swarmwire.comms.radio.medium import RadioMedium
 from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
-from tests.support.comms.radio import RATE_HZ, TICK_NS, Run, at, everybody, make_medium, packets, scattered, with_access
+from tests.support.comms.radio import (
+    TICK_NS,
+    Run,
+    at,
+    everybody,
+    jammed_by,
+    jammers,
+    make_medium,
+    packets,
+    run,
+    scattered,
+    with_access,
+)
 
 NOISE_DBM, NEAR_LOSS_DB = -106.987, 46.6777  # of the radio; nearer than 1 m the path loss is constant
 # Senders that collide now and then, around a receiver that hears some of them barely.
@@ -27,25 +37,11 @@ SLOW = replace(with_access("csma-802154"), bit_rate_bps=12_000, send_offset="tic
 Plan = Callable[[int], dict[str, list[float]]]
 
 
-def jammers(*rows: dict[str, Any]) -> Jammers:
-    """Jammers in the first arena, always on at the origin at 20 dBm unless they say otherwise."""
-    usual = {"arena": 0, "carrier": NO_ROBOT, "x_m": 0.0, "y_m": 0.0, "power_dbm": 20.0, "on_ns": 10**9}
-    full = [{**usual, "period_ns": 10**9, "phase_ns": 0, **row} for row in rows]
-    return Jammers._make(np.array([row[name] for row in full]) for name in Jammers._fields)
-
-
 def ran(
-    medium: RadioMedium, pose: FloatArray, sent: SentPackets, now: Jammers, ticks: int = 20, quiet_ticks: int = 3
+    medium: RadioMedium, pose: FloatArray, sent: SentPackets, held: Jammers, ticks: int = 20, quiet_ticks: int = 3
 ) -> Run:
     """The same is sent in each tick, while these jammers stand."""
-    result, held = Run(medium), Disruption.none(len(pose))
-    held.jammers = now
-    for tick in range(ticks + quiet_ticks):
-        result.news.append(medium.step(tick_start_ns(tick, RATE_HZ), pose, held))
-        if tick < ticks:
-            medium.send(tick_start_ns(tick, RATE_HZ), tick, sent)
-    result.last = medium.end()
-    return result
+    return run(medium, pose, lambda _: sent, ticks, quiet_ticks - 1, {0: jammed_by(held, len(pose))})
 
 
 def received(result: Run) -> list[tuple[int, ...]]:
@@ -103,10 +99,8 @@ def test_jammer_is_independent_of_the_pieces_of_time():
     """Also where a piece ends at the very time at which a jammer goes on or off."""
     radio = replace(with_access("dcf"), send_offset="uniform")
     pose = scattered(8) * [10.0, 10.0, 1.0]
-    held = Disruption.none(8)
-    held.jammers = jammers(
-        {"on_ns": 10**7, "period_ns": 2 * 10**7}, {"power_dbm": -60.0, "on_ns": 333_333, "period_ns": 10**6}
-    )
+    pulses = {"on_ns": 10**7, "period_ns": 2 * 10**7}, {"power_dbm": -60.0, "on_ns": 333_333, "period_ns": 10**6}
+    held = jammed_by(jammers(*pulses), 8)
     stories: list[Any] = []
     for piece_ns in (10**8, 10**7, 1_300_000):
         medium = make_medium(radio, 8)
@@ -185,20 +179,17 @@ def test_jammer_in_an_arena_is_independent_of_others(method: str):
     assert arena(2, [1, 9, 5]) == alone
 
 
-def run_unicast(radio: Radio, plan: Plan, *, sends: int = 1, metres: float = 1.0, ticks: int = 12) -> Run:
+def run_unicast(radio: Radio, plan: Plan, *, sends: int = 1, metres: float = 1.0) -> Run:
     """Robot 0 sends to robot 1 in the first ticks, while disruptions go by plan(tick)."""
-    medium = make_medium(radio, 2)
-    out = Run(medium)
-    for tick in range(ticks):
-        now = Disruption.none(2)
+
+    def sent_in(tick: int) -> SentPackets:
+        return replace(packets([0], 1, 100), tx_status_id=np.array([tick])) if tick < sends else SentPackets.none()
+
+    now = {tick: Disruption.none(2) for tick in range(12)}
+    for tick, disruption in now.items():
         for name, value in plan(tick).items():
-            setattr(now, name, np.array(value, getattr(now, name).dtype))
-        out.news.append(medium.step(tick * TICK_NS, at((0, 0), (metres, 0)), now))
-        if tick < sends:
-            sent = packets([0], 1, 100)
-            medium.send(tick * TICK_NS, tick, SentPackets(sent.sender, sent.to, sent.payloads, np.array([tick])))
-    out.last = medium.end()
-    return out
+            setattr(disruption, name, np.array(value, getattr(disruption, name).dtype))
+    return run(make_medium(radio, 2), at((0, 0), (metres, 0)), sent_in, 11, now=now)
 
 
 def departures(out: Run) -> list[tuple[int, int]]:
@@ -207,23 +198,17 @@ def departures(out: Run) -> list[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("end", ["alive", "radio_on"])
-def test_packet_received_is_not_refused_when_its_sender_ends(end: str):
+@pytest.mark.parametrize(
+    ("radio", "metres", "fate"),
+    [(SLOW, 1.0, "RECEIVED"), (replace(SLOW, loss=1.0), 1.0, "LOST"), (SLOW, 5000.0, "OUT_OF_RANGE")],
+    ids=["received", "lost", "far"],
+)
+def test_packet_on_air_keeps_its_fate_when_its_sender_ends(radio: Radio, metres: float, fate: str, end: str):
     """Robot 0 is deaf to the acknowledgement, tries again, and dies, or its radio goes off."""
-    out = run_unicast(SLOW, lambda tick: {"receive_gain_db": [-200.0, 0.0], end: [tick < 2, True]})
-    assert out.fates() == {"RECEIVED": 1}
+    out = run_unicast(radio, lambda tick: {"receive_gain_db": [-200.0, 0.0], end: [tick < 2, True]}, metres=metres)
+    assert out.fates() == {fate: 1}
     assert departures(out) == [(0, int(Fate.RECEIVED))]
-    assert out.tally.in_range.tolist() == [1]
-
-
-def test_packet_lost_on_air_stays_lost_when_its_sender_dies():
-    out = run_unicast(replace(SLOW, loss=1.0), lambda tick: {"alive": [tick < 2, True]})
-    assert out.fates() == {"LOST": 1}
-
-
-def test_packet_out_of_range_on_air_stays_so_when_the_radio_goes_off():
-    out = run_unicast(SLOW, lambda tick: {"radio_on": [tick < 2, True]}, metres=5000.0)
-    assert out.fates() == {"OUT_OF_RANGE": 1}
-    assert departures(out) == [(0, int(Fate.RECEIVED))]
+    assert out.tally.in_range.tolist() == [int(fate != "OUT_OF_RANGE")]
 
 
 def test_acknowledgement_wait_scales_at_low_bit_rates():

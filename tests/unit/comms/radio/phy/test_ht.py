@@ -1,4 +1,4 @@
-"""Frame exchanges of IEEE 802.11n: A-MPDU, block acknowledgements, retries, order, RTS, CTS and NAV."""
+"""IEEE 802.11n: airtimes, frame exchanges (A-MPDU, block acknowledgements, RTS, CTS, NAV), and rate control."""
 
 from collections import Counter
 from dataclasses import replace
@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.radio.config.checks import check_radio
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
 from tests.support.comms.radio import TICK_NS, Run, at, living, make_medium, packets, run, run_disrupted
+from tests.support.refusals import refused_input
 from tests.unit.world.scenario.test_bodies import radio_of
 
 PAIR, FAR_THIRD = at((0, 0), (1, 0)), at((0, 0), (1, 0), (900, 0))
@@ -88,6 +88,36 @@ def test_rts_and_cts_precede_frames_beyond_the_threshold(threshold: int, is_rese
     reservation = RTS + SIFS + CTS + SIFS if is_reserved else 0
     (at_us,) = received_us(result)
     assert 0 <= at_us - (reservation + ht_us(138)) < SLOT
+
+
+@pytest.mark.parametrize(
+    ("name", "mbps", "to", "us"),
+    [
+        # 36 us + 4 us x ceil((22 + 8 x 166) / 26 or 260 bits); at 2.4 GHz 6 us more.
+        ("wifi-n-5G", 6.5, 1, 36 + 4 * 52),
+        ("wifi-n-5G", 65, 1, 36 + 4 * 6),
+        ("wifi-n-2G", 65, 1, 36 + 4 * 6 + 6),
+        # A broadcast is an OFDM frame at 6 Mbit/s: 20 us + 4 us x ceil((22 + 8 x 166) / 24 bits).
+        ("wifi-n-5G", 65, BROADCAST, 20 + 4 * 57),
+        ("wifi-n-2G", 6.5, BROADCAST, 20 + 4 * 57 + 6),
+    ],
+)
+def test_80211n_single_packet_is_received_after_access_and_airtime(name: str, mbps: float, to: int, us: int):
+    """A packet of 100 bytes has 66 bytes of headers; nothing else is on air, so it goes on air in the next slot."""
+    radio = radio_n(preset=name, overhead_bytes=66, bit_rate_bps=round(1e6 * mbps))
+    result = run(make_medium(radio, 2), PAIR, lambda _: packets([0], to, size=100), 1, 3)
+    assert result.fates() == {"RECEIVED": 1}
+    (at_ns,) = result.received("received_at_ns").tolist()
+    assert 0 <= at_ns - 1000 * us < (9_000 if name == "wifi-n-5G" else 20_000)
+
+
+def test_80211n_bit_rate_may_change_during_a_run():
+    """From the second tick on MCS 0 in place of MCS 7."""
+    radio = radio_n()
+    slow = replace(radio, bit_rate_bps=6_500_000)
+    out = run(make_medium(radio, 2), PAIR, lambda _: packets([0], 1, 100), 2, radios={1: slow})
+    airtime_us = (out.departed("off_air_at_ns") - out.departed("on_air_at_ns")) // 1000
+    assert airtime_us.tolist() == [ht_us(138), ht_us(138, 26)]
 
 
 def exact(loss: float, seed: int = 3) -> Run:
@@ -196,15 +226,52 @@ def test_frame_of_a_sender_that_dies_is_received_but_its_queue_ends():
     assert max(received_us(result)) > 100_000  # the frame on air
 
 
-@pytest.mark.parametrize("key", ["aggregation_bytes", "rts_threshold_bytes"])
-def test_keys_of_802_11n_are_refused_with_other_frames(key: str):
-    with pytest.raises(BadInput) as error:
-        radio_of({"preset": "wifi-a-6M", "access": {key: 100}})
-    assert error.value.key == f"radio.access.{key}"
-
-
 def test_802_11n_requires_dcf():
     radio = radio_n()
-    with pytest.raises(BadInput) as error:
+    with refused_input(key="radio.access.method"):
         check_radio(replace(radio, access=replace(radio.access_or_default, method="aloha")), "a.toml")
-    assert error.value.key == "radio.access.method"
+
+
+# Rate control: ideal and AARF.
+
+
+SYMBOL_BITS = (26, 52, 78, 104, 156, 208, 234, 260)  # by MCS
+NOISE_DBM, POWER_DBM, LOSS_DB = -93.965, 16.0, 40.0  # 20 MHz at 290 K and 7 dB; log-distance, exponent 2
+# ns-3's thresholds of IdealWifiManager for its table-based error rates, in dB, by MCS.
+IDEAL_DB = (1.465, 4.475, 6.985, 10.375, 13.465, 17.865, 19.125, 20.775)
+
+
+def rates(result: Run) -> list[int]:
+    """The MCS of each packet of 1000 bytes, by its airtime."""
+    by_us = {ht_us(1066, bits): mcs for mcs, bits in enumerate(SYMBOL_BITS)}
+    airtime_us = (result.departed("off_air_at_ns") - result.departed("on_air_at_ns")) // 1000
+    order = np.argsort(result.departed("on_air_at_ns"))
+    return [by_us[us] for us in airtime_us[order].tolist()]
+
+
+def one_a_tick(rate_control: str, sinr_db: float, ticks: int, **others: Any) -> list[int]:
+    """The MCS of one packet in each tick between two robots with this SINR."""
+    loss = {"exponent": 2.0, "reference_loss_db": LOSS_DB}
+    radio = radio_n({"rate_control": rate_control}, overhead_bytes=66, log_distance=loss, **others)
+    pose = at((0, 0), (10.0 ** ((POWER_DBM - LOSS_DB - NOISE_DBM - sinr_db) / 20.0), 0))
+    return rates(run(make_medium(radio, 2), pose, lambda _: packets([0], 1, 1000), ticks, 2))
+
+
+@pytest.mark.parametrize("mcs", [4, 5, 6, 7])
+def test_ideal_takes_the_highest_rate_for_the_reported_sinr(mcs: int):
+    """The first packet has MCS 0, since its receiver has not reported yet; preambles need -82 dBm, 12 dB."""
+    above_db = IDEAL_DB[mcs + 1] if mcs < 7 else IDEAL_DB[7] + 3.0
+    assert one_a_tick("ideal", 0.5 * (IDEAL_DB[mcs] + above_db), 4) == [0, mcs, mcs, mcs]
+
+
+@pytest.mark.parametrize("rate_control", ["ideal", "aarf"])
+def test_rate_control_exceeds_no_highest_rate(rate_control: str):
+    assert max(one_a_tick(rate_control, 40.0, 35, bit_rate_bps=19_500_000)) == 2
+
+
+def test_aarf_rises_after_ten_successes_and_falls_back_after_a_failed_probe():
+    """At 15 dB MCS 4 passes and MCS 5 fails: a failed probe falls back, and the next rise needs 20 successes."""
+    result = one_a_tick("aarf", 15.0, 85)
+    # A packet whose first attempt failed is seen at the rate of its last one.
+    assert result[:50] == [0] * 10 + [1] * 10 + [2] * 10 + [3] * 10 + [4] * 10
+    assert max(result) == 4
