@@ -20,8 +20,8 @@ def refused_input(where: object = None, key: str | None = None, match: str = "")
 
 
 @contextmanager
-def refused_frame(fault: str = "malformed") -> Generator[None]:
+def refused_frame(fault: str = "malformed", match: str | None = None) -> Generator[None]:
     """Require a BadFrame that is counted under this fault."""
-    with pytest.raises(BadFrame) as caught:
+    with pytest.raises(BadFrame, match=match) as caught:
         yield
     assert caught.value.fault == fault

@@ -34,19 +34,19 @@ def build_engine(
     max_force_n: Any = 15.0,
     max_torque_nm: Any = 150.0,
     wheel_base_m: Any = 0.14,
+    bottom_m: Any = 0.0,
     followed: Any = False,
 ) -> Engine:
     """An engine of foot-bots, but for the arguments, at pose (n, 3) or (arenas, n, 3)."""
     at = np.array(pose, np.float64)
     at = at if at.ndim == 3 else at[None]
     arenas, n = at.shape[:2]
-    radius, mass, force, torque, base = (
+    radius, mass, force, torque, base, low = (
         np.broadcast_to(np.asarray(value, np.float64), n).copy()
-        for value in (radius_m, mass_kg, max_force_n, max_torque_nm, wheel_base_m)
+        for value in (radius_m, mass_kg, max_force_n, max_torque_nm, wheel_base_m, bottom_m)
     )
     motors = EngineMotors(base, force, torque, mass, 0.5 * mass * radius**2)
     standing = (tuple(obstacles),) * arenas
-    low = np.zeros(n)
     shapes = size_m, boundary, standing, obstacle_arrays(standing), radius, low, low + 0.1, motors
     return make(EngineConfig(*shapes, TICK_S, steps, np.broadcast_to(followed, n).copy()), at)
 

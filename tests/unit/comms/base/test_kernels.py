@@ -109,36 +109,23 @@ def test_machine_code_is_reused(modules, name, result):
 
 
 @needs_compiler
-def test_closure_is_compiled_again_for_another_function(modules):
-    assert modules.imported().within(1.0) == 3.0
-    modules.other = OTHER.replace("return FACTOR * x", "return FACTOR * x + 1.0")
-    assert modules.imported().within(1.0) == 4.0
-
-
-@needs_compiler
 @pytest.mark.parametrize(
-    ("old", "new", "expected"),
+    ("name", "old", "new", "before", "after"),
     [
-        ("DEEP, FAR, FACTOR = 10.0", "DEEP, FAR, FACTOR = 20.0", 123.0),
-        ("100.0, 2.0", "200.0, 2.0", 213.0),
-        ("100.0, 2.0", "100.0, 3.0", 114.0),
-        ("return FACTOR * x", "return FACTOR * x + 1.0", 114.0),
+        ("plain", "DEEP, FAR, FACTOR = 10.0", "DEEP, FAR, FACTOR = 20.0", 113.0, 123.0),
+        ("plain", "100.0, 2.0", "200.0, 2.0", 113.0, 213.0),
+        ("plain", "100.0, 2.0", "100.0, 3.0", 113.0, 114.0),
+        ("plain", "return FACTOR * x", "return FACTOR * x + 1.0", 113.0, 114.0),
+        ("within", "return FACTOR * x", "return FACTOR * x + 1.0", 3.0, 4.0),
+        ("plain", "@kernel()", '@kernel(error_model="numpy")', 113.0, 113.0),
     ],
-    ids=["a constant", "a constant by its module", "a constant of a kernel that is called", "a kernel that is called"],
+    ids=["constant", "constant by its module", "constant of a kernel", "kernel", "kernel of a closure", "options"],
 )
-def test_machine_code_is_compiled_again_after_a_change_elsewhere(modules, old, new, expected):
-    assert modules.imported().plain(1.0) == 113.0
+def test_machine_code_is_compiled_again_after_a_change_elsewhere(modules, name, old, new, before, after):
+    assert getattr(modules.imported(), name)(1.0) == before
     modules.other = OTHER.replace(old, new)
-    assert modules.imported().plain(1.0) == expected
-
-
-@needs_compiler
-def test_machine_code_is_compiled_again_with_other_options_elsewhere(modules):
-    assert modules.imported().plain(1.0) == 113.0
-    modules.other = OTHER.replace("@kernel()", '@kernel(error_model="numpy")')
-    again = modules.imported()
-    assert again.plain(1.0) == 113.0
-    assert hits(again.plain) == 0
+    compiled = getattr(modules.imported(), name)
+    assert (compiled(1.0), hits(compiled)) == (after, 0)
 
 
 @needs_compiler

@@ -177,11 +177,6 @@ def test_sensor_values_read_as_in_the_fact_sheet_and_driver(encode, values, raw)
     assert encode(np.array(values)).tolist() == raw
 
 
-def test_sensor_factors_are_those_of_the_fact_sheet_and_driver() -> None:
-    assert pytest.approx(800.0) == 9.80665 * readings.PER_MPS2
-    assert pytest.approx(819.2) == readings.PER_V
-
-
 def test_packet_headers_have_fixed_payload_sizes() -> None:
     assert packets.PORT == 1000
     assert {int(header): packets.PAYLOAD_BYTES[header] for header in packets.Header} == {1: 38400, 2: 104, 3: 0}

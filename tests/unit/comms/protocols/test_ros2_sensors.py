@@ -1,5 +1,7 @@
 """Sensors of ROS 2 robots: laser scans and all others."""
 
+# pyright: reportIndexIssue=false
+
 from math import cos, hypot, inf, nan, pi, sin
 from types import SimpleNamespace
 
@@ -23,11 +25,7 @@ from swarmwire.comms.protocols.ros2.motion import (
     motion_sensors,
     motion_variance,
 )
-from swarmwire.comms.protocols.ros2.readings import (
-    battery_state,
-    brightness_of,
-    charge_of,
-)
+from swarmwire.comms.protocols.ros2.readings import battery_state, brightness_of, charge_of
 from swarmwire.comms.protocols.ros2.transforms import proximity_range
 from swarmwire.comms.robot.bodies.body import Body, body_from, load_body
 from swarmwire.comms.robot.bodies.ros2_names import DEFAULT_NAMES
@@ -107,24 +105,23 @@ def test_scan_returns_out_of_range_read_inf_or_the_minimum(told_m, reads_m):
     assert LaserAsScan(spec, 0.0).range_m(message)[0] == pytest.approx(reads_m)
 
 
-def test_scan_of_other_rays_is_read_at_the_nearest():
-    message = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], first_rad=-pi))  # back, right, ahead, left
-    assert LaserAsScan(ScanSpec(rays=4, range_m=9.0), 0.0).range_m(message).tolist() == [3.0, 4.0, 1.0, 2.0]
-    coarse = LaserAsScan(ScanSpec(rays=8, range_m=9.0, first_deg=1.0), 0.0).range_m(message)
-    assert coarse.tolist() == [3.0, 4.0, 4.0, 1.0, 1.0, 2.0, 2.0, 3.0]
-
-
-def test_scan_of_a_clockwise_or_turned_scanner_is_rotated():
-    clockwise = received(independent.laser_scan([1.0, 2.0, 3.0, 4.0], step_rad=-pi / 2))  # ahead, right, back, left
-    spec = ScanSpec(rays=4, range_m=9.0)
-    assert LaserAsScan(spec, 0.0).range_m(clockwise).tolist() == [1.0, 4.0, 3.0, 2.0]
-    assert LaserAsScan(spec, pi / 2).range_m(clockwise).tolist() == [2.0, 1.0, 4.0, 3.0]
-
-
-def test_scan_reads_inf_outside_the_field_of_view():
-    ahead = received(independent.laser_scan([1.0] * 91, first_rad=-pi / 4, step_rad=pi / 180))
-    range_m = LaserAsScan(ScanSpec(rays=8, range_m=9.0), 0.0).range_m(ahead)
-    assert range_m.tolist() == [1.0, 1.0, inf, inf, inf, inf, inf, 1.0]
+@pytest.mark.parametrize(
+    ("ranges", "first_rad", "step_rad", "spec", "mounted_rad", "expected"),
+    [
+        # Back, right, ahead, left; read at the same rays, and at the nearest of others.
+        ([1.0, 2.0, 3.0, 4.0], -pi, None, {"rays": 4}, 0.0, [3.0, 4.0, 1.0, 2.0]),
+        ([1.0, 2.0, 3.0, 4.0], -pi, None, {"rays": 8, "first_deg": 1.0}, 0.0, [3.0, 4.0, 4.0, 1.0, 1.0, 2.0, 2.0, 3.0]),
+        # Ahead, right, back, left; of a scanner that is turned by a quarter, too.
+        ([1.0, 2.0, 3.0, 4.0], 0.0, -pi / 2, {"rays": 4}, 0.0, [1.0, 4.0, 3.0, 2.0]),
+        ([1.0, 2.0, 3.0, 4.0], 0.0, -pi / 2, {"rays": 4}, pi / 2, [2.0, 1.0, 4.0, 3.0]),
+        # A quarter of a circle ahead.
+        ([1.0] * 91, -pi / 4, pi / 180, {"rays": 8}, 0.0, [1.0, 1.0, inf, inf, inf, inf, inf, 1.0]),
+    ],
+    ids=["equal rays", "nearest rays", "clockwise", "turned", "outside the field of view"],
+)
+def test_scan_is_read_at_the_angles_of_the_sheet(ranges, first_rad, step_rad, spec, mounted_rad, expected):
+    message = received(independent.laser_scan(ranges, first_rad, step_rad))
+    assert LaserAsScan(ScanSpec(range_m=9.0, **spec), mounted_rad).range_m(message).tolist() == expected
 
 
 @pytest.mark.parametrize("broken", [{"first_rad": nan}, {"step_rad": inf}])
@@ -182,9 +179,6 @@ def test_scan_with_a_signalling_nan_has_no_return():
     signalling = np.frombuffer(bytes.fromhex("0100807f"), np.float32)
     message = SimpleNamespace(ranges=signalling, range_min=0.1, range_max=3.0)
     assert returns_m(message).tolist() == [inf]
-
-
-# pyright: reportIndexIssue=false
 
 
 def followed(travel: WheelTravel, message: independent.Odometry) -> tuple[float, float]:

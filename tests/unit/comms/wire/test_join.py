@@ -61,9 +61,8 @@ def test_join_request_survives_encoding(request_: JoinRequest) -> None:
     ids=str,
 )
 def test_join_request_that_is_invalid_is_malformed(values: dict[str, Any], message: str) -> None:
-    with pytest.raises(BadFrame, match=re.escape(message)) as caught:
+    with refused_frame("malformed", re.escape(message)):
         JoinRequest.decode(msgpack.packb({"v": VERSION, **values}))
-    assert caught.value.fault == "malformed"
 
 
 def offer_with(**changed: Any) -> bytes:
@@ -114,12 +113,6 @@ def test_session_info_lists_free_robots_by_group() -> None:
     assert replace(free, groups=OFFER.groups) == OFFER
 
 
-@pytest.mark.parametrize(("value", "name"), [(OFFER, "run"), (GROUP, "name"), (ControlRequest("pause"), "do")])
-def test_messages_are_frozen(value: object, name: str) -> None:
-    with pytest.raises(AttributeError):
-        setattr(value, name, "other")
-
-
 @pytest.mark.parametrize(
     ("changed", "named"),
     [
@@ -139,9 +132,8 @@ def test_messages_are_frozen(value: object, name: str) -> None:
     ids=str,
 )
 def test_session_info_that_is_invalid_is_malformed(changed: dict[str, Any], named: str) -> None:
-    with pytest.raises(BadFrame, match=re.escape(f"session info{named}")) as caught:
+    with refused_frame("malformed", re.escape(f"session info{named}")):
         SessionInfo.decode(offer_with(**changed))
-    assert caught.value.fault == "malformed"
 
 
 @pytest.mark.parametrize(

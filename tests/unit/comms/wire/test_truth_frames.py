@@ -26,6 +26,7 @@ from swarmwire.comms.wire.observer_frames import (
     encode_scene,
     encode_truth,
 )
+from tests.support.comms.equality import equal
 
 ROBOTS, ARENAS = 3, 2
 NOT_SENT = ("rssi_dbm", "payload", "payloads")  # as columns of numbers
@@ -118,19 +119,6 @@ def glimpses(draw: st.DrawFn) -> ObservedTick:
         events=tuple(draw(st.lists(happened, max_size=3))),
     )
     return ObservedTick(truth, draw(st.integers(0, 2**40)), draw(st.integers(1, 2**40)), draw(floats(2, ARENAS)))
-
-
-def equal(a: Any, b: Any) -> bool:
-    """Whether two truths, or parts of them, are the same in every bit."""
-    if isinstance(a, np.ndarray):
-        return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
-    if hasattr(a, "__dataclass_fields__"):
-        return type(a) is type(b) and all(equal(getattr(a, field.name), getattr(b, field.name)) for field in fields(a))
-    if isinstance(a, dict):
-        return a.keys() == b.keys() and all(equal(a[key], b[key]) for key in a)
-    if isinstance(a, tuple):
-        return len(a) == len(b) and all(map(equal, a, b))
-    return a == b
 
 
 @given(glimpses())

@@ -1,6 +1,5 @@
 """Runners that join: handshakes, allocations, and the inbox."""
 
-import queue
 import re
 from collections.abc import Generator
 from typing import Any, get_args
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 import zenoh
 
-from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.assignment import Assignment
 from swarmwire.comms.wire.join import MAX_JOIN_BYTES
@@ -23,6 +21,7 @@ from swarmwire.world.backends.lockstep import Lockstep
 from swarmwire.world.backends.realtime import RealTime
 from tests.support.agent.hosts import MEASURES, assignment, group
 from tests.support.clocks import until
+from tests.support.refusals import refused_frame
 from tests.support.world.locksteps import (
     FLOCK,
     assert_join_refused,
@@ -84,42 +83,28 @@ def test_assignment_round_trips() -> None:
 def test_malformed_assignment_is_refused_with_its_key(changed: dict[str, Any], key: str) -> None:
     mapping = assignment(group("a.b:C", [1, 4])).as_mapping()
     mapping["groups"][0] |= changed
-    with pytest.raises(BadFrame, match=re.escape(key)) as caught:
+    with refused_frame("malformed", re.escape(key)):
         Assignment.from_mapping(mapping)
-    assert caught.value.fault == "malformed"
+
+
+BAD_NAMES = ("", "a/b", "*", "**", "a*", "$*", "a?b", "a#b", "ä", "a b", "a\n", "x" * 65)
 
 
 @pytest.mark.parametrize(
-    "name", ["", "a/b", "*", "**", "a*", "$*", "a?b", "a#b", "ä", "a b", "a\n", "x" * 65], ids=repr
-)
-def test_bad_runner_name_is_refused_and_counted(roster: Roster, name: str) -> None:
-    assert_join_refused(joined(roster, "a"), name, request(), "expected a name", "bad_join")
-
-
-@pytest.mark.parametrize(
-    ("payload", "match"),
+    ("players", "name", "payload", "match", "count"),
     [
-        *((data, "malformed") for data in (b"", b"\xc1", b"\x91" * 5000, msgpack.packb(None), msgpack.packb({1: 2}))),
-        (bytes(MAX_JOIN_BYTES + 1), "oversized"),
-        *((request(version), f"expected version {frames.VERSION}") for version in (0, frames.VERSION + 1, "1", None)),
-        *((request(robots=robots), "request.robots: expected `int") for robots in (0, -1, 1.5, "3", True)),
-        *((request(names=names), "request.names") for names in ("flock-0", [1], {})),
-        (request(robots=1, names=["flock-0"]), "not both"),
-        *((request(agents=agents), "request.agents") for agents in ([], {"flock": "beef"}, {"flock": 3})),
-        (request(scenario_sha256="0" * 63), "scenario_sha256: expected"),
+        *(("a", name, request(), "expected a name", "bad_join") for name in BAD_NAMES),
+        # tests/unit/comms/wire/test_join.py has more requests.
+        *(("a", "b", data, "malformed", "bad_join") for data in (b"", msgpack.packb(None), request(robots=0))),
+        ("a", "b", bytes(MAX_JOIN_BYTES + 1), "oversized", "bad_join"),
+        ("a", "b", request(frames.VERSION + 1), f"expected version {frames.VERSION}", "bad_join"),
+        ("a", "a", request(), "in use", "refused_join"),
+        ("ab", "c", request(), "all robots are taken", "refused_join"),
     ],
     ids=repr,
 )
-def test_bad_join_request_is_refused_and_counted(roster: Roster, payload: bytes, match: str) -> None:
-    assert_join_refused(joined(roster, "a"), "b", payload, match, "bad_join")
-
-
-def test_runner_name_in_use_is_refused(roster: Roster) -> None:
-    assert_join_refused(joined(roster, "a"), "a", request(), "in use", "refused_join")
-
-
-def test_join_after_all_robots_are_taken_is_refused(roster: Roster) -> None:
-    assert_join_refused(joined(roster, "a", "b"), "c", request(), "all robots are taken", "refused_join")
+def test_join_is_refused_and_counted(roster: Roster, players: str, name: str, payload: bytes, match: str, count: str):
+    assert_join_refused(joined(roster, *players), name, payload, match, count)
 
 
 def test_first_tick_waits_until_all_runners_are_ready(roster: Roster) -> None:
@@ -146,15 +131,11 @@ def test_ready_frame_is_expected_once_before_the_first_tick(roster: Roster, kind
     assert roster.counts() == {{"ready": "unexpected_kind_frames", "actions": "wrong_tick_frames"}[kind]: 1}
 
 
-@pytest.mark.parametrize("payload", [b"\xc1", msgpack.packb(3), request(frames.VERSION + 1)])
-def test_session_info_is_refused_in_another_version(roster: Roster, payload: bytes) -> None:
-    with pytest.raises(JoinRefused):
-        roster.session_info(payload)
-    assert roster.counts() == {"bad_join": 1}
-
-
-def test_session_info_is_none_without_an_offer(roster: Roster) -> None:
+def test_session_info_is_none_without_an_offer_and_refused_in_another_version(roster: Roster) -> None:
     assert roster.session_info() is None
+    with pytest.raises(JoinRefused):
+        roster.session_info(request(frames.VERSION + 1))
+    assert roster.counts() == {"bad_join": 1}
 
 
 def test_runner_is_building_between_join_and_ready(roster: Roster) -> None:
@@ -207,11 +188,19 @@ def drain(inbox: RunnerInbox) -> list[tuple[str, bytes]]:
     return [(str(item.key_expr), item.payload.to_bytes()) for item in items if isinstance(item, zenoh.Sample)]
 
 
-def test_inbox_flood_of_one_runner_does_not_block_another(session):
-    puts = [("b", b"first"), *[("a", b"x")] * FLOOD, ("b", b"last")]
-    inbox = inbox_after(session, JoinLimits(waiting=3), *puts)
-    assert drain(inbox) == [("answer/b", b"first"), *[("answer/a", b"x")] * 3, ("answer/b", b"last")]
-    assert inbox.counts() == {"flooded_frames": FLOOD - 3}
+@pytest.mark.parametrize(
+    ("limits", "puts", "kept"),
+    [
+        (JoinLimits(waiting=3), [("b", b"first"), *[("a", b"x")] * FLOOD, ("b", b"last")], [0, 1, 2, 3, -1]),
+        # One frame of any size is accepted.
+        (JoinLimits(waiting_bytes=10), [("a", b"x" * 11), ("a", b"x"), ("b", b"x" * 10), ("b", b"x")], [0, 2]),
+    ],
+    ids=["frames", "bytes"],
+)
+def test_inbox_flood_of_one_runner_does_not_block_another(session, limits, puts, kept: list[int]):
+    inbox = inbox_after(session, limits, *puts)
+    assert drain(inbox) == [(f"answer/{puts[k][0]}", puts[k][1]) for k in kept]
+    assert inbox.counts() == {"flooded_frames": len(puts) - len(kept)}
 
 
 def test_inbox_names_the_runner_that_floods(session):
@@ -225,14 +214,6 @@ def test_inbox_has_room_again_after_a_get(session):
     inbox.put(item)
     assert inbox.qsize() == 2
     assert inbox.counts() == {}
-
-
-def test_inbox_limits_bytes_but_accepts_one_frame_of_any_size(session):
-    inbox = inbox_after(
-        session, JoinLimits(waiting_bytes=10), ("a", b"x" * 11), ("a", b"x"), ("b", b"x" * 10), ("b", b"x")
-    )
-    assert [len(payload) for _, payload in drain(inbox)] == [11, 10]
-    assert inbox.counts() == {"flooded_frames": 2}
 
 
 def inbox_after_requests(session: zenoh.Session, limits: JoinLimits, *runners: str) -> RunnerInbox:
@@ -260,8 +241,3 @@ def test_inbox_remembers_a_limited_number_of_names(session):
     inbox = inbox_after_requests(session, JoinLimits(names=2), "a", "b", "c", "d", "a")
     assert inbox.counts() == {"flooded_requests": 2}
     assert len(inbox._requests) == len(inbox._dropped_by_runner) == 2
-
-
-def test_inbox_get_raises_empty_after_its_timeout():
-    with pytest.raises(queue.Empty):
-        RunnerInbox().get(timeout=0.0)

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.tick_io import Actions, SparseTable
 from swarmwire.world.scenario_file import scenario_from
 from swarmwire.world.world import World
+from tests.support.refusals import refused_input
 
 STILL = Actions.joined([])
 CSV = """t_s,robot,x_m,y_m,z_m,heading_rad
@@ -75,61 +75,47 @@ def test_commands_to_followed_robots_are_ignored_and_counted(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("change", "key"),
+    ("motion", "tables", "key"),
     [
-        ({"file": "missing.csv"}, "robots.led.motion.file"),
-        ({"robots": ["a", "c"]}, "robots.led.motion.robots"),
-        ({"robots": ["a"]}, "robots.led.motion"),
-        ({"origin": [0.0, 0.0, 0.0]}, "robots.led.motion.origin"),
-        ({"offset_m": [4.5, 0.0]}, "robot a"),
+        ({"file": "missing.csv"}, {}, "robots.led.motion.file"),
+        ({"robots": ["a", "c"]}, {}, "robots.led.motion.robots"),
+        ({"robots": ["a"]}, {}, "robots.led.motion"),
+        ({}, {"count": 1}, "robots.led.motion"),
+        ({}, {"arena": {"size_m": [10.0, 10.0], "boundary": "torus"}}, "robots.led.motion"),
+        # An origin is for EMANE alone, and always, whatever the case of the suffix.
+        *(({"file": file}, {}, "robots.led.motion.origin") for file in ("a.EEL", "a.eel")),
+        ({"file": "a.CSV", "origin": [0.0, 0.0, 0.0]}, {}, "robots.led.motion.origin"),
+        ({"offset_m": [4.5, 0.0]}, {}, "robot a"),
     ],
 )
-def test_trace_that_does_not_fit_names_key_or_robot(tmp_path: Path, change: dict[str, Any], key: str) -> None:
-    with pytest.raises(BadInput) as error:
-        world_of(mapping({**traced(tmp_path), **change}))
-    assert error.value.key == key
+def test_trace_that_does_not_fit_names_key_or_robot(tmp_path: Path, motion: dict[str, Any], tables: Any, key: str):
+    with refused_input(key=key):
+        world_of(mapping({**traced(tmp_path), **motion}, **tables))
 
 
-def test_trace_of_more_robots_than_the_group_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInput) as error:
-        world_of(mapping(traced(tmp_path), count=1))
-    assert error.value.key == "robots.led.motion"
-
-
-def test_torus_has_no_followed_robots(tmp_path: Path) -> None:
-    table = mapping(traced(tmp_path), arena={"size_m": [10.0, 10.0], "boundary": "torus"})
-    with pytest.raises(BadInput) as error:
-        scenario_from(table, "test")
-    assert error.value.key == "robots.led.motion"
+def moved_to(world: World, row: int, *values: float) -> None:
+    """A tick at whose end a robot has this new pose: x, y, z in m, heading in rad, or the first of these."""
+    slots = len(values)
+    world.move(replace(STILL, poses=SparseTable(np.full(slots, row), np.arange(slots), np.array(values))))
 
 
 def test_live_robot_stands_where_it_was_placed_until_its_first_pose() -> None:
-    placement = {"how": "poses", "poses": [[0.0, 1.0, 0.5], [2.0, 1.0, 0.0]]}
     table = mapping({"source": "udp"})
-    table["robots"]["led"]["place"] = placement
+    table["robots"]["led"]["place"] = {"how": "poses", "poses": [[0.0, 1.0, 0.5], [2.0, 1.0, 0.0]]}
     world = world_of(table)
     world.move(STILL)
     assert world.pose[:, :2].tolist() == [[0.0, 1.0], [2.0, 1.0]]
-    new = SparseTable(np.array([1, 1, 1, 1]), np.arange(4), np.array([-3.0, 2.0, 1.5, 1.0]))
-    world.move(Actions(*(np.empty(0, kind) for kind in (np.int64, np.bool_, float, float, float)), poses=new))
+    moved_to(world, 0, -1.0, 1.0)
+    assert world.pose[0].tolist() == [-1.0, 1.0, 0.5]  # without a heading it keeps that of its place
+    moved_to(world, 1, -3.0, 2.0, 1.5, 1.0)
     assert world.pose[1].tolist() == [-3.0, 2.0, 1.0]
     assert world.velocity[1].tolist() == [0.0, 0.0, 0.0]  # set there, not moved there
     assert world.radio_pose[:, 3].tolist() == [0.0, 1.5]
-    new = SparseTable(np.array([1, 1]), np.arange(2), np.array([-2.9, 2.0]))
-    world.move(Actions(*(np.empty(0, kind) for kind in (np.int64, np.bool_, float, float, float)), poses=new))
+    moved_to(world, 1, -2.9, 2.0)
     assert world.velocity[1] == pytest.approx([1.0, 0.0, 0.0])
     world.move(STILL)
     assert world.pose[1] == pytest.approx([-2.9, 2.0, 1.0])
     assert world.velocity[1].tolist() == [0.0, 0.0, 0.0]
-
-
-def test_first_live_pose_without_a_heading_keeps_that_of_the_place() -> None:
-    table = mapping({"source": "udp"})
-    table["robots"]["led"]["place"] = {"how": "poses", "poses": [[0.0, 1.0, 0.5], [2.0, 1.0, -2.0]]}
-    world = world_of(table)
-    new = SparseTable(np.array([1, 1]), np.arange(2), np.array([-3.0, 2.0]))
-    world.move(replace(STILL, poses=new))
-    assert world.pose[1].tolist() == [-3.0, 2.0, -2.0]
 
 
 @pytest.mark.parametrize("engine", ["kinematic", "discs", "pymunk"])
@@ -147,14 +133,6 @@ def test_live_robot_is_at_its_first_pose_before_the_first_tick(engine: str) -> N
     assert world.velocity[1] == pytest.approx([1.0, 0.0, 0.0])  # 0.1 m in a tick of 0.1 s
     assert onsets[0, 0] == 1  # with the free robot, then 6 cm away: both have a radius of 3.5 cm
     assert world.pose[1] == pytest.approx([-2.9, 2.0, 0.0])
-
-
-@pytest.mark.parametrize(("file", "origin"), [("a.EEL", None), ("a.eel", None), ("a.CSV", [0.0, 0.0, 0.0])])
-def test_origin_is_for_emane_alone_and_always_whatever_the_case_of_the_suffix(file: str, origin: object) -> None:
-    settings = {} if origin is None else {"origin": origin}
-    with pytest.raises(BadInput) as error:
-        scenario_from(mapping({"source": "trace", "file": file, **settings}), "test")
-    assert error.value.key == "robots.led.motion.origin"
 
 
 ORBIT = """
@@ -181,10 +159,9 @@ def test_custom_source_moves_robots_and_its_faults_name_the_key(tmp_path: Path) 
     for _ in range(10):
         world.move(STILL)
     assert world.pose[:, 0] == pytest.approx([0.5, 1.5])
-    for params, key in (({}, "params"), ({"speed_mps": float("nan")}, ""), ({"speed_mps": 1.0, "rows": 1}, "")):
-        with pytest.raises(BadInput) as error:
+    for params, key in (({}, ".params"), ({"speed_mps": float("nan")}, ""), ({"speed_mps": 1.0, "rows": 1}, "")):
+        with refused_input(key=f"robots.led.motion{key}"):
             world_of(mapping({**motion, "params": params}))
-        assert error.value.key == f"robots.led.motion{'.' if key else ''}{key}"
 
 
 def test_followed_group_beside_robots_that_drive_shares_their_engine(tmp_path: Path) -> None:

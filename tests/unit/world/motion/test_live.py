@@ -73,63 +73,38 @@ def test_pose_that_cannot_be_used_is_counted_and_changes_nothing(
     assert (poses(source), source.counts()) == ({}, {count: 1})
 
 
-def test_jump_is_ignored_until_its_speed_would_be_allowed() -> None:
-    clock = FakeClock()
-    source = live_poses(clock, max_speed_mps=2.0, max_age_s=100.0)
-    source.put("a-0", 0.0, 0.0, 0.0, 0.0)
-    clock.time_ns += NS_PER_S
-    source.put("a-0", 6.0, 0.0, 0.0, 0.0)
-    source.put("a-1", 0.0, 0.0, 0.0, 0.0)
-    assert poses(source)[4] == {0: 0.0, 1: 0.0, 2: 0.0, 3: 0.0}
-    assert source.counts() == {"poses_jumped": 1}
-    clock.time_ns += 2 * NS_PER_S
-    source.put("a-0", 6.0, 0.0, 0.0, 0.0)
-    assert poses(source)[4][0] == 6.0
+S = NS_PER_S
+STAMPED = {"stamps": True, "max_age_s": 100.0}
 
 
-def test_poses_that_arrive_together_may_have_been_sent_a_tenth_of_a_second_apart() -> None:
-    source = live_poses(FakeClock(), max_speed_mps=20.0)
-    source.put("a-0", 0.0, 0.0, 0.0, 0.0)
-    source.put("a-0", 2.0, 0.0, 0.0, 0.0)  # 20 m/s over 0.1 s
-    assert poses(source)[4][0] == 2.0
-    source.put("a-0", 4.2, 0.0, 0.0, 0.0)
-    assert source.counts() == {"poses_jumped": 1}
-
-
-def test_jump_counts_also_in_height() -> None:
-    clock = FakeClock()
-    source = live_poses(clock, max_speed_mps=2.0, max_age_s=100.0)
-    source.put("a-0", 0.0, 0.0, 1.0, 0.0)
-    clock.time_ns += NS_PER_S
-    source.put("a-0", 0.0, 0.0, 9.0, 0.0)
-    assert poses(source)[4][2] == 1.0
-    assert source.counts() == {"poses_jumped": 1}
-
-
-def test_stamps_order_poses_and_time_jumps_in_place_of_their_arrival() -> None:
-    clock = FakeClock()
-    source = live_poses(clock, max_speed_mps=2.0, stamps=True, max_age_s=100.0)
-    source.put("a-0", 0.0, 0.0, 0.0, 0.0, 5 * NS_PER_S)
-    source.put("a-0", 3.0, 0.0, 0.0, 0.0, 7 * NS_PER_S)  # 1.5 m/s by the stamps; both arrive at once
-    source.put("a-0", 1.0, 0.0, 0.0, 0.0, 6 * NS_PER_S)
-    clock.time_ns += 60 * NS_PER_S
-    source.put("a-0", 6.0, 0.0, 0.0, 0.0, 8 * NS_PER_S)  # 3 m/s by the stamps
-    source.put("a-0", 3.0, 0.0, 0.0, 0.0)
-    assert poses(source)[4][0] == 3.0
-    assert source.counts() == {"poses_late": 1, "poses_jumped": 1, "poses_malformed": 1}
-
-
-def test_pose_that_was_wrong_is_replaced_once_the_robot_was_silent() -> None:
-    clock = FakeClock()
-    source = live_poses(clock, max_speed_mps=2.0, stamps=True, max_age_s=1.0)
-    source.put("a-0", 9.0, 0.0, 0.0, 0.0, 900 * NS_PER_S)  # of the future, and far away
-    clock.time_ns += NS_PER_S
-    source.put("a-0", 0.0, 0.0, 0.0, 0.0, NS_PER_S)
-    assert poses(source)[4][0] == 9.0
-    clock.time_ns += 1
-    source.put("a-0", 0.5, 0.0, 0.0, 0.0, NS_PER_S + 1)
-    assert poses(source)[4][0] == 0.5
-    assert source.counts() == {"poses_late": 1}
+@pytest.mark.parametrize(
+    ("settings", "puts", "counts"),
+    [  # puts: ns since the last one, x and z in m, stamp, and the x and z that are used then
+        ({"max_age_s": 100.0}, [(0, (0, 0), None, (0, 0)), (S, (6, 0), None, (0, 0)), (2 * S, (6, 0), None, (6, 0))],
+         {"poses_jumped": 1}),
+        ({"max_age_s": 100.0}, [(0, (0, 1), None, (0, 1)), (S, (0, 9), None, (0, 1))], {"poses_jumped": 1}),
+        # Poses that arrive together may have been sent a tenth of a second apart.
+        ({"max_speed_mps": 20.0}, [(0, (0, 0), None, (0, 0)), (0, (2, 0), None, (2, 0)), (0, (4.2, 0), None, (2, 0))],
+         {"poses_jumped": 1}),
+        # Stamps order poses and time jumps, in place of their arrival.
+        (STAMPED, [(0, (0, 0), 5 * S, (0, 0)), (0, (3, 0), 7 * S, (3, 0)), (0, (1, 0), 6 * S, (3, 0)),
+                   (60 * S, (6, 0), 8 * S, (3, 0)), (0, (3, 0), None, (3, 0))],
+         {"poses_late": 1, "poses_jumped": 1, "poses_malformed": 1}),
+        # A wrong pose, of the future and far away, is replaced once the robot was silent.
+        ({"stamps": True, "max_age_s": 1.0},
+         [(0, (9, 0), 900 * S, (9, 0)), (S, (0, 0), S, (9, 0)), (1, (0.5, 0), S + 1, (0.5, 0))], {"poses_late": 1}),
+    ],
+    ids=["jump", "jump in height", "together", "stamps", "wrong"],
+)  # fmt: skip
+def test_pose_that_jumps_or_is_late_is_not_used(settings, puts, counts: dict[str, int]) -> None:
+    clock, used = FakeClock(), {0: 0.0, 2: 0.0}
+    source = live_poses(clock, **{"max_speed_mps": 2.0, **settings})
+    for passed_ns, (x_m, z_m), stamp_ns, expected in puts:
+        clock.time_ns += passed_ns
+        source.put("a-0", x_m, 0.0, z_m, 0.0, *([] if stamp_ns is None else [stamp_ns]))
+        used |= poses(source).get(4, {})
+        assert (used[0], used[2]) == expected
+    assert source.counts() == counts
 
 
 def test_pose_that_arrived_by_the_time_is_given_though_a_newer_one_waits() -> None:
