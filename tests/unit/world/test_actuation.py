@@ -165,10 +165,6 @@ def wheels_of(actuators: Actuators, left_mps: float, right_mps: float) -> Any:
     return np.stack(wheels_of_twist(actuators.target[..., 0], actuators.target[..., 1], BASE_M), axis=2)
 
 
-def test_noise_factor_multiplies_the_speed_of_each_wheel() -> None:
-    np.testing.assert_allclose(wheels_of(noisy(factor=0.9), 0.1, -0.05)[0, 0], [0.09, -0.045])
-
-
 def test_noise_bias_is_added_before_the_factor() -> None:
     got = wheels_of(noisy(factor=0.5, bias_mps=0.02), 0.1, -0.05)
     np.testing.assert_allclose(got[1, 3], [0.06, -0.015])
@@ -205,12 +201,6 @@ def test_noise_is_equal_for_an_arena_alone_and_with_fewer_robots() -> None:
     np.testing.assert_array_equal(alone[0], both[1, :7])
 
 
-def test_target_without_noise_is_the_command() -> None:
-    for still in (noisy(), noisy(factor=1.0, bias_std_mps=0.0)):
-        wheels_of(still, 0.1, -0.05)
-        np.testing.assert_array_equal(still.target.reshape(-1, 3), still.command)
-
-
 @pytest.mark.parametrize("kind", ["noisy", "still"])
 def test_truth_has_the_command_while_noise_makes_robots_drift(kind: str) -> None:
     world = World(posed([[0.0, 0.0, 0.0]]), [1], {})
@@ -226,13 +216,6 @@ def test_truth_has_the_command_while_noise_makes_robots_drift(kind: str) -> None
 def changes(*listed: tuple[int, int, int]) -> SparseTable:
     rows, slot, rgb = np.array(listed, np.int64).reshape(-1, 3).T
     return SparseTable(rows, slot, rgb.astype(float))
-
-
-def test_leds_are_dark_at_the_start_with_room_for_every_body() -> None:
-    leds = LedStates(GROUPS, 2)
-    assert leds.rgb.shape == (2, 3, 13)
-    assert leds.published.shape == (6, 13)
-    assert not leds.rgb.any()
 
 
 def test_led_holds_its_colour_until_it_is_switched_again() -> None:

@@ -283,9 +283,7 @@ def test_compressed_trajectories_are_bezier_curves_in_mm() -> None:
 
 
 @pytest.mark.parametrize(("flags", "stretch"), [((0, 0, 1), 1.0), ((0, 0, 0), 2.0)])
-def test_compressed_trajectories_are_refused_reversed_and_stretched(
-    flags: tuple[int, int, int], stretch: float
-) -> None:
+def test_compressed_trajectories_are_refused_reversed_and_stretched(flags: tuple[int, int, int], stretch: float):
     flight = Flight()  # ENOEXEC, as in the firmware
     upload(flight, compressed_trajectory(b"\1" + struct.pack("<Hh", 1000, 500)))
     define(flight, 1, 1)

@@ -186,18 +186,18 @@ def started_jammers(event: Jammer, swarm: Swarm = APART, serial: int = 0) -> Jam
     return conditions.disruption().jammers
 
 
-def test_jammer_stands_at_its_position_in_every_arena():
-    jammers = started_jammers(jammer(at=(1.0, -2.0)))
+@pytest.mark.parametrize(
+    ("where", "carriers", "at_m"),
+    [
+        ({"at": (1.0, -2.0)}, [NO_ROBOT, NO_ROBOT], [[1.0, -2.0, 0.0]] * 2),
+        ({"robots": Selection(names=("a-1",))}, [1, 4], [[3.0, 4.0, 0.0], [12.0, 13.0, 0.0]]),
+    ],
+)
+def test_jammer_is_at_its_position_or_carrier_in_every_arena(where: Any, carriers: list[int], at_m: list[list[float]]):
+    jammers = started_jammers(jammer(**where))
     assert jammers.arena.tolist() == [0, 1]
-    assert jammers.carrier.tolist() == [NO_ROBOT, NO_ROBOT]
-    assert jammers.positions(in_space(APART.pose)).tolist() == [[1.0, -2.0, 0.0]] * 2
-
-
-def test_jammer_moves_with_its_carrier():
-    jammers = started_jammers(jammer(robots=Selection(names=("a-1",))))
-    assert jammers.arena.tolist() == [0, 1]
-    assert jammers.carrier.tolist() == [1, 4]
-    assert jammers.positions(in_space(APART.pose)).tolist() == [[3.0, 4.0, 0.0], [12.0, 13.0, 0.0]]
+    assert jammers.carrier.tolist() == carriers
+    assert jammers.positions(in_space(APART.pose)).tolist() == at_m
 
 
 def test_jammers_of_several_events_add_up_and_end_one_by_one():
@@ -222,7 +222,7 @@ def test_jammer_phase_differs_by_arena_and_jammer():
     assert ((together >= 0) & (together < 10**9)).all()
 
 
-@pytest.mark.parametrize("duty", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("duty", [0.1, 0.5, 0.9, 1.0])
 def test_jammer_is_on_for_its_duty_and_toggles_at_both_ends(duty: float):
     jammers = started_jammers(jammer(at=(0.0, 0.0), duty=duty, period_s=0.0007))
     assert jammers.duty == pytest.approx([duty] * 2, abs=1e-6)
@@ -242,12 +242,6 @@ def test_jammer_toggles_are_the_same_in_steps_and_at_once():
     at_once = jammers.toggles(0, 100_000_000)
     steps = [jammers.toggles(at_ns, at_ns + 10_000_000) for at_ns in range(0, 100_000_000, 10_000_000)]
     assert np.concatenate([times for times, _ in steps]).tolist() == at_once[0].tolist()
-
-
-def test_jammer_that_is_always_on_never_toggles():
-    jammers = started_jammers(jammer(at=(0.0, 0.0)))
-    assert jammers.is_on(123).all()
-    assert len(jammers.toggles(0, 10**9)[0]) == 0
 
 
 def test_jammer_is_refused_for_a_radio_without_interference():
@@ -271,19 +265,19 @@ def ramp(key: str, to: float, at_s: float = 1.0, **keys: Any) -> Ramp:
     return Ramp(at_s=at_s, what=key, to=to, **keys)
 
 
-def test_ramp_is_linear_and_keeps_its_final_value():
-    loss = numbers(started_ramps(ramp("radio.loss", 0.5, over_s=4.0)), "radio.loss", 1.0, 2.0, 3.0, 5.0, 9.0)
-    assert loss == pytest.approx([0.1, 0.2, 0.3, 0.5, 0.5])
-    assert loss[-1] == 0.5
-
-
-def test_ramp_without_a_duration_is_a_step():
-    assert numbers(started_ramps(ramp("radio.range_m", 1.5)), "radio.range_m", 1.0, 1.1) == [1.5, 1.5]
-
-
-def test_ramp_rounds_whole_numbers():
-    conditions = started_ramps(ramp("radio.queue_limit", 0.0, over_s=8.0))
-    assert numbers(conditions, "radio.queue_limit", 1.0, 2.0, 2.1, 9.0) == [20, 18, 17, 0]
+@pytest.mark.parametrize(
+    ("event", "expected"),  # by time in s
+    [
+        (ramp("radio.loss", 0.5, over_s=4.0), {1.0: 0.1, 2.0: 0.2, 3.0: 0.3, 5.0: 0.5, 9.0: 0.5}),
+        (ramp("radio.range_m", 1.5), {1.0: 1.5, 1.1: 1.5}),
+        (ramp("radio.queue_limit", 0.0, over_s=8.0), {1.0: 20, 2.0: 18, 2.1: 17, 9.0: 0}),
+    ],
+)
+def test_ramp_is_linear_rounds_whole_numbers_and_keeps_its_final_value(event: Ramp, expected: dict[float, float]):
+    conditions = started_ramps(event)
+    reached = numbers(conditions, event.what, *expected)
+    assert reached == pytest.approx(list(expected.values()))
+    assert reached[-1] == event.to
     assert isinstance(conditions.radio_at(RADIO, to_ns(2.1)).queue_limit, int)
 
 

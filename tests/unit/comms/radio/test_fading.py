@@ -313,12 +313,6 @@ def test_shadowing_of_touching_robots_is_zero():
     assert over_arenas(3.0, 4.0, 3.0, 4.001).std() < 0.02
 
 
-def test_shadowing_field_depends_on_the_arena_key_alone():
-    alone = field_waves(KEYS[7:8], UNIT)[0]
-    assert np.array_equal(alone, shadow_waves()[7])
-    assert not np.array_equal(shadow_waves()[7], shadow_waves()[8])
-
-
 def test_shadowing_scales_with_deviation_and_correlation_length():
     """Twice the deviation, ten times all lengths: the same field doubled."""
     larger = Shadowing(2.0, 10.0 * DELTA_M)

@@ -256,14 +256,6 @@ def bodies_on_floor(x: FloatArray, y: FloatArray, radius_m: FloatArray, cell_m: 
     return BodyParams(x, y, np.zeros(len(x)), radius_m, height_m, float(radius_m.max()), grid, len(x) // arenas)
 
 
-def test_bodies_on_the_line_are_counted_but_not_its_ends():
-    x, y = np.array([0.0, 1.0, 2.0, 3.0, 1.5, 4.0]), np.array([0.0, 0.05, 0.2, 0.0, -0.09, 0.0])
-    bodies = bodies_on_floor(x, y, np.full(6, 0.1), 5.0, 1)
-    # Robot 1 and robot 4 are on it, robot 2 is beside it, robot 5 behind it.
-    a, b = np.array([0, 3, 0]), np.array([3, 0, 1])
-    assert bodies_between(bodies, a, b).tolist() == [2, 2, 0]
-
-
 @pytest.mark.parametrize("cell_m", [0.2, 1.0, 30.0])
 def test_bodies_by_grid_equal_a_test_of_all(cell_m: float):
     draws = np.random.default_rng(3)

@@ -94,17 +94,6 @@ def test_radio_without_a_send_offset_or_range_is_refused(radio: Radio, key: str)
         make_medium(radio, 2)
 
 
-def test_geometry_is_that_of_the_tick_on_air():
-    """Sent in tick 0, on air in tick 1 (its very start included), near in only one of them."""
-    near, far = at((0, 0), (1, 0)), at((0, 0), (3, 0))
-    for before, after, send_offset, received in ((near, far, 0.15, 0), (far, near, 0.15, 1), (far, near, 0.1, 1)):
-        medium = make_medium(Radio(2.0, send_offset=send_offset), 2)
-        medium.step(0, before)
-        medium.send(0, 0, packets([0]))
-        assert len(medium.step(TICK_NS, after).finished.fate) == 0
-        assert len(medium.step(2 * TICK_NS, after).received) == received
-
-
 def test_time_does_not_run_backwards():
     medium = make_medium(Radio(2.0), 2)
     medium.step(TICK_NS, at((0, 0), (1, 0)))

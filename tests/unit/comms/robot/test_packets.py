@@ -62,16 +62,6 @@ def test_payload_offsets_are_int64_in_every_table() -> None:
     assert listed(tables[-1]) == [b"", b""]
 
 
-def test_sent_packets_keep_their_order_when_joined() -> None:
-    first = SentPackets(np.array([3]), np.array([BROADCAST]), Payloads.from_rows([b"aa"]))
-    second = SentPackets(np.array([1, 1]), np.array([0, 2]), Payloads.from_rows([b"b", b"ccc"]))
-    joined = SentPackets.joined([first, SentPackets.none(), second])
-    assert joined.sender.tolist() == [3, 1, 1]
-    assert joined.to.tolist() == [BROADCAST, 0, 2]
-    assert listed(joined.payloads) == [b"aa", b"b", b"ccc"]
-    assert len(SentPackets.joined([])) == 0
-
-
 def test_tx_status_ids_follow_their_packets_when_joined() -> None:
     silent = SentPackets(np.array([3]), np.array([BROADCAST]), Payloads.from_rows([b"aa"]))
     asking = SentPackets(np.array([1, 1]), np.array([0, 2]), Payloads.from_rows([b"b", b"ccc"]), np.array([4, 5]))

@@ -14,6 +14,7 @@ from swarmwire.comms.base.arrays import AnyArray
 from swarmwire.comms.base.errors import BadFrame
 from swarmwire.comms.wire import frames
 from swarmwire.comms.wire.frames import DTYPES, MAX_ITEMS, UNCOUNTED_BYTES, unpacked
+from tests.support.comms.equality import equal
 
 shapes = npst.array_shapes(min_dims=1, max_dims=2, min_side=0, max_side=4)
 arrays = st.sampled_from(sorted(DTYPES)).flatmap(lambda code: npst.arrays(DTYPES[code], shapes))
@@ -47,9 +48,7 @@ def test_frame_survives_encoding(kind: str, tick: int, given_arrays: dict[str, A
     frame = frames.decode(frames.encode(kind, tick, given_arrays, values))
     assert (frame.kind, frame.tick, frame.values) == (kind, tick, values)
     assert list(frame.arrays) == list(given_arrays)
-    for name, array in given_arrays.items():
-        got = frame.arrays[name]
-        assert (got.dtype, got.shape, got.tobytes()) == (array.dtype, array.shape, array.tobytes())
+    assert equal(dict(frame.arrays), given_arrays)
 
 
 def test_frame_layout_is_fixed_in_msgpack() -> None:
@@ -179,12 +178,6 @@ def test_frame_with_flipped_bits_decodes_or_is_refused() -> None:
         except BadFrame:
             refused += 1
     assert refused > 500
-
-
-def test_frame_of_random_bytes_is_malformed() -> None:
-    generator = np.random.default_rng(2)
-    for _ in range(3000):
-        assert fault(generator.bytes(int(generator.integers(0, 60)))) == "malformed"
 
 
 @given(plain)

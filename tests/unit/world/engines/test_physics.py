@@ -78,9 +78,7 @@ def test_engine_of_the_scenario_is_used(engine: str) -> None:
         ({}, {"obstacles": [{**MOVABLE, "movable": False}]}, "arena.obstacles.0.mass_kg"),
     ],
 )
-def test_physics_contradictions_are_refused_with_their_key(
-    physics: dict[str, Any], arena: dict[str, Any], key: str
-) -> None:
+def test_physics_contradictions_are_refused_with_their_key(physics: dict[str, Any], arena: dict[str, Any], key: str):
     with refused_input("posed", key):
         posed([[-1.0, 0.0, 0.0]], physics=physics, arena={**ARENA, **arena})
 

@@ -1,6 +1,5 @@
 """Formats of motion traces: BonnMotion, ns-2, EMANE and tables."""
 
-import gzip
 from dataclasses import replace
 from math import inf, nan
 from pathlib import Path
@@ -64,12 +63,6 @@ def test_bonnmotion_dimensions_are_those_that_the_file_states(
     if parameters:
         (tmp_path / "a.params").write_text(parameters)
     assert positions(read(tmp_path, "a.movements", text), 6.0) == [expected]
-
-
-def test_bonnmotion_compressed_is_read(tmp_path: Path) -> None:
-    with gzip.open(tmp_path / "a.movements.gz", "wt") as file:
-        file.write("0.0 1.0 2.0\n")
-    assert positions(read_trace(tmp_path / "a.movements.gz"), 0.0) == [[1.0, 2.0, 0.0]]
 
 
 NS2_SQUARE = """
@@ -206,9 +199,7 @@ def test_table_may_be_sorted_by_time_or_robot_and_lack_what_is_zero(tmp_path: Pa
 
 @pytest.mark.parametrize("suffix", [".movements", ".movements.gz", ".csv", ".parquet"])
 @given(trace=traces())
-def test_round_trip_keeps_every_sample(
-    tmp_path_factory: pytest.TempPathFactory, suffix: str, trace: MotionTrace
-) -> None:
+def test_round_trip_keeps_every_sample(tmp_path_factory: pytest.TempPathFactory, suffix: str, trace: MotionTrace):
     path = tmp_path_factory.mktemp("trace") / f"a{suffix}"
     write_trace(path, trace)
     names = trace.names if suffix in (".csv", ".parquet") else tuple(map(str, range(len(trace.names))))
@@ -228,9 +219,7 @@ def test_round_trip_of_a_table_keeps_headings(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", [".tcl", ".eel"])
 @given(trace=traces())
-def test_round_trip_keeps_every_position(
-    tmp_path_factory: pytest.TempPathFactory, suffix: str, trace: MotionTrace
-) -> None:
+def test_round_trip_keeps_every_position(tmp_path_factory: pytest.TempPathFactory, suffix: str, trace: MotionTrace):
     path = tmp_path_factory.mktemp("trace") / f"a{suffix}"
     if suffix == ".tcl":
         columns = trace.t_s, trace.x_m, trace.y_m, np.full(len(trace.t_s), 2.5), trace.heading_rad
@@ -282,9 +271,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("name", "text", "key", "match"), FAULTS)
-def test_faults_of_a_file_are_refused_with_their_line(
-    tmp_path: Path, name: str, text: str, key: str, match: str
-) -> None:
+def test_faults_of_a_file_are_refused_with_their_line(tmp_path: Path, name: str, text: str, key: str, match: str):
     with refused_input(tmp_path / name, key, match):
         read(tmp_path, name, text, ORIGIN)
 

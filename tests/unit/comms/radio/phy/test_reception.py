@@ -54,13 +54,6 @@ def test_near_frame_of_two_is_received_as_in_ns3(far_first: bool):
     assert result.received("sender_index").tolist() == [int(far_first)]
 
 
-def test_equal_frames_at_once_are_both_lost_without_capture():
-    """One of IEEE 802.15.4 has as much, by its spreading: at 0 dB it hears 95 of 100 frames."""
-    radio = replace(with_access("aloha"), reception=Reception("threshold", min_sinr_db=3.0))
-    result = run(make_medium(radio, 3), at((-1, 0), (1, 0), (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
-    assert result.fates() == {"COLLIDED": 2}
-
-
 @pytest.mark.parametrize("load", [0.25, 0.5, 1.0])
 def test_aloha_throughput_matches_abramson(load: float):
     """S = G exp(-2 G) of pure ALOHA: many equal senders, one listener, no capture.

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray, IntArray
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.base.geometry.obstacles import obstacle_arrays, to_nearest
+from swarmwire.comms.base.geometry.obstacles import obstacle_arrays
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
@@ -42,17 +42,6 @@ def test_addressed_packet_to_oneself_or_outside_is_refused(to: int):
     news = medium.step(10**8, pose)
     assert news.received.sequence.tolist() == [0]
     assert news.tally.sent.tolist() == [1]
-
-
-@pytest.mark.parametrize("shape", BETWEEN)
-def test_obstacle_in_the_line_of_sight_blocks(shape: str):
-    """Blocked receivers are not in range; without line of sight they hear."""
-    pose = at((-1, 0), (1, 0), (-1, 1))
-    for line_of_sight, fates, in_range in ((True, {"RECEIVED": 4, "BLOCKED": 2}, 4), (False, {"RECEIVED": 6}, 6)):
-        radio = Radio(9.0, line_of_sight=line_of_sight, send_offset="tick")
-        result = run(make_medium(radio, 3, [1], [[BETWEEN[shape]]]), pose, everybody(3), 1)
-        assert result.fates() == fates
-        assert result.tally.in_range.tolist() == [in_range]
 
 
 def test_range_and_bearing_are_exact_without_noise():
@@ -188,11 +177,6 @@ def test_torus_obstacles_block_across_the_seam() -> None:
     across = np.abs(pose[:, None, :2] - pose[None, :, :2] + away(pose)).max(axis=2) > 1.0
     assert sum(across[pair] for pair in blocked) > 100
     assert pairs(*edges.T) == near - blocked
-
-
-def test_torus_offset_is_the_nearest_image() -> None:
-    assert to_nearest(5.9, 0.0) == 0.0
-    assert [x_m + to_nearest(x_m, 6.0) for x_m in (5.9, -3.5, 2.0)] == pytest.approx([-0.1, 2.5, 2.0])
 
 
 @pytest.mark.parametrize("radio", [Radio(model="friis"), Radio(range_m=1.0, bodies_block=True)])
