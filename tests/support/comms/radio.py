@@ -351,14 +351,16 @@ def signal_radios(draw: st.DrawFn) -> Radio:
 
 
 def story(result: Run, robots: int, arena: int = 0) -> list[tuple[object, ...]]:
-    """Everything received in one arena, with what came with it, and every other fate, by tick; then its tally."""
+    """What is received in one arena, with what came with it, every other fate and status, by tick; then its tally."""
     rows: list[tuple[object, ...]] = []
     for tick, step in enumerate(result.news):
-        h, f = step.received, step.finished
+        h, f, t = step.received, step.finished, step.tx_status
         for i in np.flatnonzero(h.receiver // robots == arena):
             measured = tuple(column[i] for column in h.measured.values())
             columns_ = h.sender_index[i], h.sequence[i], h.received_at_ns[i], *measured, h.payloads.row(h.payload[i])
             rows.append((tick, "received", h.receiver[i] % robots, *columns_))
         columns = f.receiver, f.sender, f.sequence, f.fate, f.on_air_at_ns, f.final_at_ns
         rows += sorted((tick, "fate", *(column[i] for column in columns)) for i in np.flatnonzero(f.arena == arena))
+        asked = np.flatnonzero(t.row // robots == arena)
+        rows += [(tick, "status", t.row[i] % robots, t.id[i], t.result[i]) for i in asked]
     return [*rows, (*result.tally.fates[arena], result.tally.in_range[arena])]

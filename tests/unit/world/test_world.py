@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import ReceivedPackets
 from swarmwire.comms.robot.tick_io import MAX_STATES, NOTHING_SET, Actions, SparseTable
@@ -40,30 +39,6 @@ def test_radio_poses_have_the_heights_of_bodies_until_others_are_set() -> None:
     world.move(commanded(world, 0.0, 0.0))
     assert world.radio_pose[:, 3].tolist() == [0.0, 0.5, 2.0, 3.0]
     assert before[:, 3].tolist() == [0.0, 0.5] * 2
-
-
-def test_arena_runs_equally_alone_and_among_seven_others() -> None:
-    many = sample_world(*range(8))
-    alone = [sample_world(seed) for seed in (2, 7)]
-    robots, contacts = many.static.robots, 0
-    for tick in range(60):
-        readings = many.sense(tick)
-        onsets = many.move(wandering(many, tick))
-        contacts += onsets[2].sum()
-        for world, arena in zip(alone, (2, 7), strict=True):
-            rows = slice(arena * robots, (arena + 1) * robots)
-            for group, alone_readings in world.sense(tick).items():
-                of_arena = readings[group].rows // robots == arena
-                assert np.array_equal(readings[group].rows[of_arena] - arena * robots, alone_readings.rows)
-                assert alone_readings.fields.keys() == readings[group].fields.keys()
-                for field, values in alone_readings.fields.items():
-                    assert np.array_equal(readings[group].fields[field][of_arena], values), (field, tick)
-            assert np.array_equal(world.move(wandering(world, tick))[0], onsets[arena])
-            assert np.array_equal(world.pose, many.pose[rows])
-            assert np.array_equal(world.velocity, many.velocity[rows])
-            assert np.array_equal(world.command, many.command[rows])
-    assert contacts > 0
-    assert many.keys.tolist() == [derive_key("arena", seed) for seed in range(8)]
 
 
 def test_readings_have_a_row_per_robot_of_the_group_in_all_arenas() -> None:

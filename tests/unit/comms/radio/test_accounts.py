@@ -36,6 +36,7 @@ from tests.support.comms.radio import (
     signal_radios,
     with_access,
 )
+from tests.unit.world.scenario.test_bodies import radio_of
 
 BOTH, FIRST = np.array([True, True]), np.array([True, False])
 ROBOTS, ARENAS = 3, 2
@@ -58,6 +59,19 @@ def random_run(radio: Radio, arenas: int, robots: int, seed: int, quiet_ticks: i
     return run(medium, pose, lambda _: random_traffic(rng, arenas, robots), 4, quiet_ticks)
 
 
+def check_departed(ended: Run) -> None:
+    """Of packets that all have left: once each, intended and out of range as the tally has them."""
+    packet = Counter(ended.rows("departed", "arena", "sender", "sequence"))
+    assert set(packet.values()) <= {1}
+    tally = ended.tally
+    assert len(packet) == tally.sent.sum()
+    assert ended.departed("intended").sum() == tally.intended.sum()
+    assert ended.departed("out_of_range").sum() == tally.fates[:, Fate.OUT_OF_RANGE].sum()
+    airtime_ns = ended.departed("off_air_at_ns") - ended.departed("on_air_at_ns")
+    assert (airtime_ns >= 0).all()
+    assert (airtime_ns == 0)[ended.departed("fate") != Fate.RECEIVED].all()
+
+
 @pytest.mark.parametrize("radios", KINDS.values(), ids=KINDS)
 @given(st.data(), st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000), st.sampled_from([0, 2, 8]))
 def test_fates_add_up_and_tally_agrees_with_listed_links(
@@ -65,8 +79,12 @@ def test_fates_add_up_and_tally_agrees_with_listed_links(
 ):
     """Received packets, listed links and the tally tell the same story, in every tick; no receiver has two fates."""
     radio = data.draw(radios)
+    if quiet_ticks == 8 and radio.frame == "plain":
+        radio = replace(radio, bit_rate_bps=250_000)
     result = random_run(radio, arenas, robots, seed, quiet_ticks)
     check_fates(result)
+    if quiet_ticks == 8:
+        check_departed(result)
     for step in result.news:
         listed = np.zeros_like(step.tally.fates)
         np.add.at(listed, (step.finished.arena, step.finished.fate), step.finished.receivers)
@@ -116,28 +134,6 @@ def test_counters_of_some_arenas_close_while_others_count_on():
     remaining = accounts.close()
     assert (remaining.sent.tolist(), remaining.fates[:, Fate.LOST].tolist()) == ([1, 2, 0], [0, 5, 0])
     assert accounts.close().sent.tolist() == [0, 0, 0]
-
-
-def check_packets(ended: Run) -> None:
-    """Of packets that all have left: once each, intended and out of range as the tally has them."""
-    packet = Counter(ended.rows("departed", "arena", "sender", "sequence"))
-    assert set(packet.values()) <= {1}
-    tally = ended.tally
-    assert len(packet) == tally.sent.sum()
-    assert ended.departed("intended").sum() == tally.intended.sum()
-    assert ended.departed("out_of_range").sum() == tally.fates[:, Fate.OUT_OF_RANGE].sum()
-    airtime_ns = ended.departed("off_air_at_ns") - ended.departed("on_air_at_ns")
-    assert (airtime_ns >= 0).all()
-    assert (airtime_ns == 0)[ended.departed("fate") != Fate.RECEIVED].all()
-
-
-@pytest.mark.parametrize("radios", KINDS.values(), ids=KINDS)
-@given(st.data(), st.integers(1, 3), st.integers(2, 12), st.integers(0, 1000))
-def test_packet_departs_once(radios, data, arenas: int, robots: int, seed: int):
-    radio = data.draw(radios)
-    if radio.frame == "plain":
-        radio = replace(radio, bit_rate_bps=250_000)
-    check_packets(random_run(radio, arenas, robots, seed, 8))
 
 
 def test_departure_has_receivers_and_airtime():
@@ -305,7 +301,18 @@ def random_disruption(rng: np.random.Generator, rows: int, most_jammers: int) ->
     return Disruption(alive, radio_on, backlog, sides, one_way, *gain_db, jammers(*held))
 
 
-@pytest.mark.parametrize(("radios", "most_jammers"), [(RADIOS, 0), (signal_radios(), 3)], ids=KINDS)
+@st.composite
+def presets(draw: st.DrawFn) -> Radio:
+    """Radios with an access of their own, whose packets last for long."""
+    esb = {"preset": "crazyradio-250k", "access": {"safelink": draw(st.booleans())}}
+    radio = draw(st.sampled_from([radio_of(esb), replace(radio_of({"preset": "ble-1M"}), bit_rate_bps=9_600)]))
+    lifetime_s, loss = draw(st.sampled_from([None, 0.002])), draw(st.sampled_from([0.0, 0.3]))
+    return replace(radio, loss=loss, queue_lifetime_s=lifetime_s, queue_limit=draw(st.integers(0, 4)))
+
+
+@pytest.mark.parametrize(
+    ("radios", "most_jammers"), [(RADIOS, 0), (signal_radios(), 3), (presets(), 3)], ids=[*KINDS, "presets"]
+)
 @given(st.data(), st.integers(2, 9), st.integers(0, 1000), st.sampled_from([0, 1, 8]))
 def test_fates_add_up_under_any_disruption(radios, most_jammers: int, data, robots: int, seed: int, quiet_ticks: int):
     """Also while the radio's parameters change; and nobody dead, off or not meant hears anything."""

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from swarmwire.comms.base.arrays import AnyArray, FloatArray, IntArray
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.geometry.shapes import Obstacle
-from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
 from swarmwire.comms.base.threads import WORTH_ROWS
 from swarmwire.comms.radio.config.impairments import BearingMeasure, Delays, Measures, RangeMeasure
 from swarmwire.comms.radio.config.radio import Radio
@@ -28,6 +28,8 @@ from tests.support.comms.radio import (
     Run,
     drawing,
     everybody,
+    jammed_by,
+    jammers,
     make_medium,
     packets,
     random_traffic,
@@ -37,6 +39,7 @@ from tests.support.comms.radio import (
     story,
     with_access,
 )
+from tests.unit.world.scenario.test_bodies import radio_of
 
 ROBOTS = 7
 RADIO = Radio(
@@ -53,11 +56,12 @@ COLUMNS = ("receiver", "sender_index", "sequence", "received_at_ns")
 
 
 def two_each(arenas: int) -> SentPackets:
-    """Each robot sends two different packets, one to all and one to its neighbour."""
-    sender = np.repeat(np.arange(ROBOTS), 2)
-    sent = packets(sender, np.where(np.arange(2 * ROBOTS) % 2, (sender + 1) % ROBOTS, BROADCAST), size=20)
-    payloads = sent.payloads.select(np.tile(np.arange(2 * ROBOTS), arenas))
-    return SentPackets(np.repeat(np.arange(arenas * ROBOTS), 2), np.tile(sent.to, arenas), payloads)
+    """Each robot sends two different packets, one to all and one to its neighbour, of which it asks for the status."""
+    sender, number = np.repeat(np.arange(ROBOTS), 2), np.arange(2 * ROBOTS)
+    sent = packets(sender, np.where(number % 2, (sender + 1) % ROBOTS, BROADCAST), size=20)
+    payloads, to = sent.payloads.select(np.tile(number, arenas)), np.tile(sent.to, arenas)
+    ids = np.where(to == BROADCAST, NO_TX_STATUS, np.tile(number, arenas))
+    return SentPackets(np.repeat(np.arange(arenas * ROBOTS), 2), to, payloads, ids)
 
 
 def poses(radio: Radio, rows: int) -> FloatArray:
@@ -65,14 +69,32 @@ def poses(radio: Radio, rows: int) -> FloatArray:
     return scattered(rows) * ([1.0, 1.0, 1.0] if radio.model == "unit-disk" else [20.0, 20.0, 1.0])
 
 
-@pytest.mark.parametrize("radio", [RADIO, *map(drawing, METHODS)], ids=["unit-disk", *METHODS])
+def disrupted(radio: Radio, arenas: Sequence[int]) -> dict[int, Disruption]:
+    """Robots of arena 0 send so strongly that all would be near to them; jammers stand or move in each arena."""
+    held = [
+        jammer
+        for row, arena in enumerate(arenas)
+        for jammer in (
+            {"arena": row, "x_m": 20.0 * arena, "on_ns": 3 * 10**6, "period_ns": 10**7},
+            {"arena": row, "carrier": ROBOTS * row + arena, "power_dbm": -35.0},
+        )
+    ]
+    now = jammed_by(jammers(*held if radio.model != "unit-disk" else ()), len(arenas) * ROBOTS)
+    return {0: replace(now, send_gain_db=np.repeat([30.0 * (arena == 0) for arena in arenas], ROBOTS))}
+
+
+@pytest.mark.parametrize(
+    "radio",
+    [RADIO, *map(drawing, METHODS), radio_of({"preset": "ble-1M"})],
+    ids=["unit-disk", *METHODS, "advertising"],
+)
 def test_arena_alone_equals_the_arena_among_others(radio: Radio):
-    seeds = (11, 12, 13)
-    pose = poses(radio, 3 * ROBOTS)
-    together = run(make_medium(radio, ROBOTS, seeds, OBSTACLES), pose, lambda _: two_each(3), 5, 2)
+    pose, seeds = poses(radio, 3 * ROBOTS), (11, 12, 13)
+    medium, now = make_medium(radio, ROBOTS, seeds, OBSTACLES), disrupted(radio, range(3))
+    together = run(medium, pose, lambda _: two_each(3), 5, 2, now)
     for arena, seed in enumerate(seeds):
-        alone_medium = make_medium(radio, ROBOTS, [seed], [OBSTACLES[arena]])
-        alone = run(alone_medium, pose[arena * ROBOTS : (arena + 1) * ROBOTS], lambda _: two_each(1), 5, 2)
+        medium, now = make_medium(radio, ROBOTS, [seed], [OBSTACLES[arena]]), disrupted(radio, [arena])
+        alone = run(medium, pose[arena * ROBOTS : (arena + 1) * ROBOTS], lambda _: two_each(1), 5, 2, now)
         assert len(story(alone, ROBOTS)) > 30
         assert story(alone, ROBOTS) == story(together, ROBOTS, arena)
 
@@ -86,13 +108,11 @@ def test_order_among_senders_does_not_matter(radio: Radio, shuffle):
     index = np.array(shuffle.sample(range(len(sent)), len(sent)))
     for s in range(ROBOTS):
         index[np.isin(index, (2 * s, 2 * s + 1))] = 2 * s, 2 * s + 1
-    mixed = SentPackets(sent.sender[index], sent.to[index], sent.payloads.select(index))
-    pose = poses(radio, ROBOTS)
-    runs = [
-        run(make_medium(radio, ROBOTS), pose, lambda _, sent_packets=sent_packets: sent_packets, 3, 2)
-        for sent_packets in (sent, mixed)
-    ]
-    assert story(runs[0], ROBOTS) == story(runs[1], ROBOTS)
+    sent_in_order, mixed = (
+        run(make_medium(radio, ROBOTS), poses(radio, ROBOTS), lambda _, each=each: each, 3, 2)
+        for each in (sent, sent.select(index))
+    )
+    assert story(sent_in_order, ROBOTS) == story(mixed, ROBOTS)
 
 
 def test_measurement_noise_does_not_shift_other_draws():
@@ -133,6 +153,7 @@ def test_payloads_hold_only_received_packets():
 
 
 SIX, TICKS = 6, 5
+PULSES = {"on_ns": 10**7, "period_ns": 2 * 10**7}, {"power_dbm": -60.0, "on_ns": 333_333, "period_ns": 10**6}
 SIGNALS = st.sampled_from([*map(with_access, METHODS), *map(drawing, METHODS)])
 
 
@@ -155,8 +176,9 @@ def all_results(news: list[Results]) -> list[Any]:
 def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) -> tuple[list[Any], list[int]]:
     """What becomes of packets sent at several times within ticks, where time passes in these parts of a tick, too.
 
-    Where robots are out, one is dead and one's radio is off for two ticks. What is received by a tick's start is told
-    before that: a robot that has been handed a packet has received it, though it be dead a moment later.
+    Where robots are out, one is dead and one's radio is off for two ticks, while jammers pulse on a PHY. What is
+    received by a tick's start is told before that: a robot that has been handed a packet has received it, though it be
+    dead a moment later.
     """
     rng = np.random.default_rng(seed)
     pose = scattered(SIX, seed)
@@ -164,7 +186,8 @@ def played(medium: RadioMedium, parts: list[float], seed: int, out: int | None) 
     for tick in range(TICKS):
         start_ns, disruption = tick_start_ns(tick, RATE_HZ), None
         if out is not None and tick in (1, 3):
-            disruption = Disruption.none(SIX)
+            is_jammed = tick == 1 and medium.radio.model != "unit-disk"
+            disruption = jammed_by(jammers(*PULSES if is_jammed else ()), SIX)
             if tick == 1:
                 disruption.radio_on[out] = disruption.alive[(out + 1) % SIX] = False
         within.append(medium.advance(start_ns)[0])

@@ -244,21 +244,6 @@ def test_antenna_power_of_a_group_decides_reception():
     assert set(result.received("receiver").tolist()) == {1}
 
 
-@pytest.mark.parametrize("method", ["none", "aloha", "csma-802154", "dcf"])
-def test_gain_in_other_arenas_changes_nothing(method: str):
-    """Other arenas' antennas reach so far that all would be near: their own pairs stay what they were."""
-    radio = replace(everything(method), shadowing=Shadowing(10.0, 2.0))
-    far = 2.0 if method == "dcf" else 6.0
-    pose = FEW * [far, far, 1.0]
-    alone = ran(make_medium(radio, 8, [5]), pose, everybody(8), {})
-    elsewhere = np.repeat([30.0, 0.0], 8)
-    three = ran(make_medium(radio, 8, [1, 5]), np.tile(pose, (2, 1)), everybody(16), {0: gained(elsewhere)})
-    is_own = three.finished("arena") == 1
-    assert len(links(alone)) > 50
-    columns = ("sender", "receiver", "sequence", "fate", "final_at_ns")
-    assert sorted(zip(*(three.finished(name)[is_own].tolist() for name in columns), strict=True)) == links(alone)
-
-
 def on_air_ticks(result: Run) -> list[int]:
     return (result.on_air("on_air_at_ns") // 10**8).tolist()
 

@@ -16,7 +16,6 @@ from tests.support.comms.radio import (
     TICK_NS,
     Run,
     check_fates,
-    everybody,
     jammed_by,
     jammers,
     living,
@@ -145,27 +144,6 @@ def test_one_channel_without_delay_is_aloha(kind: str):
         for each in (replace(radio, access=Access("aloha"), advertising=None), one)
     )
     assert sorted(map(str, advertising)) == sorted(map(str, aloha))
-
-
-def test_fates_add_up_while_radios_are_off_and_robots_die():
-    """Events of 150 ms and more: most end in a later tick."""
-    radio, robots = replace(ble(), bit_rate_bps=9_600, loss=0.1), 6
-    rng = np.random.default_rng(7)
-    sent = {tick: random_traffic(rng, 2, robots) for tick in range(8)}
-    now = disrupted(12, 2 * robots)
-    pose = np.concatenate([scattered(robots), scattered(robots, 6)])
-    result = run_disrupted(make_medium(radio, robots, seeds=(1, 2)), pose, sent, now, 30)
-    check_fates(result)
-    assert {"RECEIVED", "COLLIDED", "NOT_LISTENING", "BLACKOUT"} <= result.fates().keys()
-
-
-def test_arenas_do_not_interact():
-    radio, robots = ble(), 6
-    pose = np.concatenate([scattered(robots, seed) for seed in (5, 6)])
-    both = run(make_medium(radio, robots, seeds=(1, 2)), pose, everybody(2 * robots), 4, 1)
-    second = run(make_medium(radio, robots, seeds=(2,)), pose[robots:], everybody(robots), 4, 1)
-    in_second = [(*fields, receiver - robots, at) for *fields, receiver, at in received(both) if receiver >= robots]
-    assert in_second == received(second)
 
 
 @pytest.mark.parametrize("phase_ns", [0, 50_000_000])

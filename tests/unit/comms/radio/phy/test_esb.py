@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from swarmwire.comms.base.draws import derive_key
 from swarmwire.comms.base.sentinels import BROADCAST
@@ -31,7 +29,6 @@ from tests.support.comms.radio import (
     make_medium,
     numbers_received,
     packets,
-    random_traffic,
     run,
     run_disrupted,
 )
@@ -215,31 +212,6 @@ def test_tag_of_a_crtp_packet_is_not_on_air():
     result = run(make_medium(crazyradio("250k"), 2), np.zeros((2, 3)), lambda _: sent, 1, 30)
     period_us = 31 + 260 + (57 + 16 + 8 * 31) / 0.25 + NULL_US["250k"] + 8.2
     assert set(np.diff(result.received("received_at_ns")).tolist()) == {round(1e3 * period_us)}
-
-
-@given(
-    st.integers(0, 10_000),
-    st.sampled_from([0.0, 0.3]),
-    st.sampled_from([None, 0.002]),
-    st.integers(0, 4),
-    st.booleans(),
-)
-def test_fates_add_up_whatever_fails(
-    seed: int, loss: float, queue_lifetime_s: float | None, queue_limit: int, safelink: bool
-):
-    """Robots die, radios are off; three arenas of five robots."""
-    rng, rows = np.random.default_rng(seed), 15
-    others = {"queue_limit": queue_limit, "queue_lifetime_s": queue_lifetime_s, "access": {"safelink": safelink}}
-    radio = crazyradio("250k", loss=loss, **others)
-    states = dict[int, Disruption]()
-    for tick in range(6):
-        state = replace(Disruption.none(rows), alive=rng.random(rows) < 0.8, radio_on=rng.random(rows) < 0.8)
-        state.backlog[:] = rng.choice([DROP, NEWEST, ALL], rows)
-        states[tick] = state if rng.random() < 0.7 else Disruption.none(rows)
-    sent = {tick: random_traffic(rng, 3, 5) for tick in range(6)}
-    pose = np.column_stack([rng.uniform(-3.0, 3.0, (rows, 2)), np.zeros(rows)])
-    result = run_disrupted(make_medium(radio, 5, (1, 2, 3)), pose, sent, states, 8)
-    check_fates(result)
 
 
 @pytest.mark.parametrize(("rate", "sensitivity_dbm"), [("250k", -94.0), ("1M", -85.0), ("2M", -82.0)])

@@ -1,6 +1,6 @@
 """Jammers, and retries of the MAC."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -95,27 +95,6 @@ def test_jammer_drowns_exactly_the_frames_that_overlap():
     assert begins_clear.sum() > 3, "some frames are drowned on the way"
 
 
-def test_jammer_is_independent_of_the_pieces_of_time():
-    """Also where a piece ends at the very time at which a jammer goes on or off."""
-    radio = replace(with_access("dcf"), send_offset="uniform")
-    pose = scattered(8) * [10.0, 10.0, 1.0]
-    pulses = {"on_ns": 10**7, "period_ns": 2 * 10**7}, {"power_dbm": -60.0, "on_ns": 333_333, "period_ns": 10**6}
-    held = jammed_by(jammers(*pulses), 8)
-    stories: list[Any] = []
-    for piece_ns in (10**8, 10**7, 1_300_000):
-        medium = make_medium(radio, 8)
-        result = Run(medium)
-        for tick in range(4):
-            result.news.append(medium.step(tick * 10**8, pose, held))
-            medium.send(tick * 10**8, tick, packets([0, 1, 2]))
-            for at_ns in range(tick * 10**8 + piece_ns, (tick + 1) * 10**8, piece_ns):
-                medium.advance(at_ns)
-        result.news.append(medium.step(4 * 10**8, pose))
-        stories.append((sorted(received(result)), np.sort(result.on_air("on_air_at_ns")).tolist()))
-    assert len(stories[0][0]) > 5
-    assert stories[0] == stories[1] == stories[2]
-
-
 def test_jammer_blocks_carrier_sense():
     """CSMA gives up; DCF waits for a gap, and sends in it."""
     csma = ran(make_medium(with_access("csma-802154"), 2), at((0, 0), (5, 0)), packets([0, 1]), jammers({}))
@@ -157,26 +136,6 @@ def test_jammer_removes_edges_by_its_duty_cycle(on_ms: int, joined: bool):
     now = jammers({"on_ns": on_ms * 10**6, "period_ns": 10**8})
     result = ran(make_medium(with_access("aloha"), 2), at((0, 0), (20, 0)), packets([0]), now, ticks=1)
     assert result.edges.tolist() == ([[0, 1]] if joined else [])
-
-
-@pytest.mark.parametrize("method", ["aloha", "csma-802154", "dcf"])
-def test_jammer_in_an_arena_is_independent_of_others(method: str):
-    radio = replace(with_access(method), send_offset="uniform", shadowing=Shadowing(8.0, 2.0))
-    pose = scattered(8) * [15.0, 15.0, 1.0]
-
-    def arena(at_row: int, seeds: Sequence[int]) -> list[tuple[int, ...]]:
-        placed = [
-            {"arena": at_row, "on_ns": 3 * 10**6, "period_ns": 10**7},
-            {"arena": at_row, "carrier": 8 * at_row + 3, "power_dbm": -35.0},
-        ]
-        others = [{"arena": other, "x_m": 5.0} for other in range(len(seeds)) if other != at_row]
-        medium, rows = make_medium(radio, 8, seeds), 8 * len(seeds)
-        result = ran(medium, np.tile(pose, (len(seeds), 1)), everybody(rows)(0), jammers(*others, *placed), ticks=6)
-        return [(r % 8, s, n) for r, s, n in received(result) if r // 8 == at_row]
-
-    alone = arena(0, [5])
-    assert alone
-    assert arena(2, [1, 9, 5]) == alone
 
 
 def run_unicast(radio: Radio, plan: Plan, *, sends: int = 1, metres: float = 1.0) -> Run:

@@ -8,17 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.comms.base.arrays import FloatArray, IntArray
+from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS, NOWHERE
 from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.disruption import Disruption
 from swarmwire.comms.radio.unit_disk.tx_queue import QUEUE_FULL
 from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult, TxStatuses
-from tests.support.comms.radio import METHODS, Run, at, drawing, make_medium, packets, run, scattered, with_access
+from tests.support.comms.radio import METHODS, Run, at, make_medium, packets, run, scattered, with_access
 from tests.unit.world.scenario.test_bodies import radio_of
 
-ROBOTS = 8
 ACKNOWLEDGING = ("csma-802154", "dcf")
 NEAR, FAR = at((0, 0), (1, 0)), at((0, 0), (5000, 0))
 
@@ -236,23 +235,3 @@ def test_tx_status_is_dropped_at_death_and_negative_with_the_radio_off():
             result.news.append(result.medium.step(tick * 10**8, NEAR, disruption if tick == 1 else None))
             result.medium.send(tick * 10**8, tick, ask(packets([0] * 3, 1) if tick == 0 else SentPackets.none()))
         assert [answer for _, _, answer in learned(result)] == expected
-
-
-@pytest.mark.parametrize("method", ACKNOWLEDGING)
-def test_tx_status_is_independent_of_sender_order_and_other_arenas(method: str):
-    def statuses_with(seeds: list[int], order: IntArray | slice) -> list[list[tuple[int, int, str]]]:
-        rows = len(seeds) * ROBOTS
-        sender = np.repeat(np.arange(rows), 3)
-        sent = packets(sender, (sender + 1) % ROBOTS)
-        numbered = replace(sent, tx_status_id=np.tile(np.arange(3), rows)).select(np.arange(3 * rows)[order])
-        pose = np.tile(scattered(ROBOTS) * [20.0, 20.0, 1.0], (len(seeds), 1))
-        news = run(make_medium(drawing(method), ROBOTS, seeds), pose, lambda _: numbered, 1, 9).news
-        return [listed(step.tx_status) for step in news]
-
-    plain = statuses_with([7], slice(None))
-    assert len({result for step in plain for _, _, result in step}) > 1
-    by_sender_backwards = np.arange(3 * ROBOTS).reshape(ROBOTS, 3)[::-1].ravel()
-    assert statuses_with([7], by_sender_backwards) == plain
-    several = statuses_with([5, 7, 6], slice(None))
-    of_arena = [[(row - ROBOTS, id_, value) for row, id_, value in step if row // ROBOTS == 1] for step in several]
-    assert of_arena == plain
