@@ -279,17 +279,6 @@ def test_impulse_at_its_limit_passes_no_wall_and_no_robot(engine):
     assert sum(truth.contact_onsets[0, 0] for truth in truths) >= 1
 
 
-def test_impulse_is_equal_for_an_arena_alone_and_among_others():
-    event = {"do": "impulse", "at_s": 0.2, "robots": {"count": 1}, "speed_mps": 0.4}
-    scenario = posed([[0.0, 0.0, 0.3], [0.3, 0.0, 0.0]], "footbot", events=[event])
-    digests = []
-    for seeds in ([5], [1, 5, 9]):
-        loop = Loop(World(scenario, seeds, {}), None, ForwardBackend(0.1), [], scenario.events)
-        loop.run(20)
-        digests.append(loop.hexdigests()[seeds.index(5)])
-    assert digests[0] == digests[1]
-
-
 def test_impulse_is_refused_for_bodies_without_contacts():
     event = {"do": "impulse", "at_s": 0.2, "robots": {"group": "flock"}, "speed_mps": 0.4}
     mapping = changed("events", [event])

@@ -50,10 +50,8 @@ def answer_of(runner: str, tick: int, speed: float, drive: bool = True) -> bytes
     """An answer that commands `speed` and sends a packet with the tick from each robot."""
     rows = np.array(ROWS_OF[runner], np.int64)
     sent = SentPackets(rows, np.full(len(rows), BROADCAST), Payloads.from_rows([bytes([0, 0, tick])] * len(rows)))
-    n = len(rows)
-    return encode_actions(
-        tick, Actions(rows, np.full(n, drive), np.full(n, speed), np.full(n, -speed), np.zeros(n), sent)
-    )
+    speeds = np.full(len(rows), speed)
+    return encode_actions(tick, Actions(rows, np.full(len(rows), drive), speeds, -speeds, 2.0 * speeds, sent))
 
 
 def answer_with(tick: int, rows: Sequence[int], **tables: SparseTable) -> bytes:
@@ -71,6 +69,7 @@ def pop(runners: RealTime) -> tuple[dict[int, float], list[int]]:
     got = runners.pop_actions()
     commands = {int(row): float(v) for row, v in zip(got.rows[got.drive], got.linear_mps[got.drive], strict=True)}
     assert (got.angular_radps == -got.linear_mps).all()
+    assert (got.lateral_mps == 2.0 * got.linear_mps).all()
     return commands, [got.sent.payloads.row(i)[2] for i in range(len(got.sent))]
 
 
@@ -133,18 +132,6 @@ def test_leds_and_noted_values_of_two_answers_are_merged_in_their_order() -> Non
     assert (got.values.rows.tolist(), got.values.value.tolist()) == ([0, 2, 2], [0.5, 0.5, 0.75])
     later = runners.pop_actions()
     assert len(later.leds) == len(later.values) == 0
-
-
-def test_lateral_speed_is_commanded_and_stopped_like_the_others() -> None:
-    runners = playing()
-    rows = np.array(ROWS_OF["a"], np.int64)
-    half = np.full(len(rows), 0.5)
-    for tick, expected in ((0, 1.0), (1, 0.0)):
-        open_tick(runners, tick)
-        runners.answer("a", encode_actions(tick, Actions(rows, half.astype(bool), half, half, 2.0 * half)))
-        if tick:
-            runners._stop(rows)
-        assert runners.pop_actions().lateral_mps[rows].tolist() == [expected] * len(rows)
 
 
 @pytest.mark.parametrize("tick", [0, 1, 2, 4])

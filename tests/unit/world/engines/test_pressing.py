@@ -127,17 +127,3 @@ def test_mixed_crowd_of_discs_in_a_shrinking_gap_never_overlaps(seed: int, still
         engine.tick(targets(engine, speed_mps, towards(engine, 2.9, 0.0)))
         assert overlap_m(engine, radius_m, (6.0, 4.0)) <= MAX_OVERLAP_M
         assert in_boxes_m(engine.state[0, :, :2], radius_m, funnel) <= MAX_OVERLAP_M
-
-
-@pytest.mark.parametrize("make", FLOOR)
-def test_pressing_is_bit_for_bit_equal_alone_and_among_arenas(make: Make) -> None:
-    names = ["kilobot", "kilobot", "footbot"]
-    pressed = line_poses(names, 1.5)
-    free, aside = pressed - np.array([1.0, 0.0, 0.0]), pressed + np.array([0.0, 0.9, 0.0])
-    ends: list[FloatArray] = []
-    for pose in ([free, pressed, aside], [pressed]):
-        engine, _ = engine_of(make, names, np.array(pose), size_m=SIZE_M)
-        for _ in range(40):
-            engine.tick(targets(engine, [0.0, 0.0, 0.3]))
-        ends.append(engine.state[1 if len(pose) == 3 else 0])
-    assert np.array_equal(*ends)
