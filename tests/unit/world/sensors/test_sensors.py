@@ -113,6 +113,18 @@ def test_proximity_to_a_wall_follows_the_curve_of_the_body(
         assert reading == pytest.approx(value, abs=error)
 
 
+@pytest.mark.parametrize("body", [EPUCK, FOOTBOT])
+def test_proximity_kernel_equals_the_curve_of_the_sheet(body: Body) -> None:
+    assert body.proximity is not None
+    poses = np.random.default_rng(1).uniform(-1, 1, (100, 3)) * [0.6, 0.6, np.pi]
+    looked_at = scene(poses, body, size_m=1.4)
+    distance_m, value = proximity(looked_at, body).distance_m()[0], values(looked_at, body)
+    detected = np.isfinite(distance_m)
+    assert 100 < np.count_nonzero(detected) < detected.size
+    assert np.array_equal(value[detected], body.proximity.response.value(distance_m[detected]))
+    assert not value[~detected].any()
+
+
 # Of each sensor: a spec with noise, its distribution, and its sizes by field, absolute and as a share of the value.
 NOISE: dict[str, tuple[SensorSpec, Any, dict[str, tuple[float, float]]]] = {
     "proximity": (ProximitySpec(**RING, noise=0.05), uniform, {"value": (0.05, 0.0)}),
