@@ -141,12 +141,6 @@ def test_lora_frames_overlap_from_the_critical_section_of_the_preamble_on(ticks:
     assert fates_by_sender(overlap(10.0, ticks, lora(spreading_factor=12))) == {1: fate, 2: fate}
 
 
-def test_lora_airtime_counts_from_the_start_of_the_preamble():
-    result = run(make_medium(lora(), 2), PAIR, lambda _: packets([0]), 1, 3)
-    assert result.finished("on_air_at_ns").tolist() == [0]
-    assert result.finished("final_at_ns").tolist() == airtime_ns(lora(), np.array([14])).tolist()
-
-
 def test_lora_robot_receives_nothing_while_it_sends():
     result = run(make_medium(lora(), 2), PAIR, lambda _: packets([0, 1]), 1, 3)
     assert result.fates() == {"COLLIDED": 2}

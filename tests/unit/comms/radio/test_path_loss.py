@@ -24,7 +24,7 @@ from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.propagation.obstruction import BodyParams, bodies_between, is_on_line, wall_loss_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db, reach_m, rssi_dbm
 from swarmwire.comms.radio.reception.receiver import chunk_success, ieee802154
-from tests.support.comms.lines import crossed_on_floor, indexed, is_blocked_on_floor
+from tests.support.comms.lines import crossed_on_floor, indexed
 
 getcontext().prec = 40
 PI = Decimal("3.1415926535897932384626433832795028841972")
@@ -88,17 +88,6 @@ def test_path_loss_of_two_ray_is_exact(distance_m: float, frequency_hz: float, s
     expected = float(friis_db(distance_m, frequency_hz) if near else ground)
     curve = TwoRay(sender_m, receiver_m).curve(frequency_hz)
     assert loss_db(curve, distance_m) == pytest.approx(expected, rel=EXACT, abs=1e-12)
-
-
-@given(FREQUENCIES, st.floats(0.05, 30.0), st.floats(0.05, 30.0))
-def test_crossover_of_two_ray_is_exact_and_continuous(frequency_hz: float, sender_m: float, receiver_m: float):
-    model = TwoRay(sender_m, receiver_m)
-    expected = 4 * PI * Decimal(sender_m) * Decimal(receiver_m) * Decimal(frequency_hz) / LIGHT
-    assert model.crossover_m(frequency_hz) == pytest.approx(float(expected), rel=EXACT)
-    curve = model.curve(frequency_hz)
-    ground_db = float(40 * expected.log10() - 20 * (Decimal(sender_m) * Decimal(receiver_m)).log10())
-    assert friis_db(float(expected), frequency_hz) == pytest.approx(Decimal(ground_db), abs=Decimal("1e-11"))
-    assert curve.break_m == model.crossover_m(frequency_hz)
 
 
 @given(st.floats(1.0, 1e5), FREQUENCIES, st.integers(0, 4))
@@ -209,44 +198,6 @@ def test_wall_loss_counts_obstacles_and_metres_of_its_arena_and_overlaps_twice()
     assert loss == pytest.approx(2 * 5.0 + 4.0 * 3.0, rel=1e-12)
     assert through(walls(), -2.0, 0.0, 8.0, 0.0, arena=1) == (0, 0.0)
     assert through(walls(), -2.0, 0.0, 8.0, 0.0, arena=2) == (2, pytest.approx(4.0, rel=1e-12))
-
-
-@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES)
-def test_wall_chords_are_equal_in_both_directions(ax: float, ay: float, bx: float, by: float):
-    assert through(walls(), ax, ay, bx, by) == through(walls(), bx, by, ax, ay)
-
-
-@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES, st.floats(0.0, 1.0))
-def test_wall_chords_of_parts_add_up(ax: float, ay: float, bx: float, by: float, share: float):
-    mx, my = ax + share * (bx - ax), ay + share * (by - ay)
-    parts_m = through(walls(), ax, ay, mx, my)[1] + through(walls(), mx, my, bx, by)[1]
-    # A point in the middle is off the line by rounding; a chord that grazes a circle changes by the root of that.
-    assert parts_m == pytest.approx(through(walls(), ax, ay, bx, by)[1], abs=1e-6)
-
-
-@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES)
-def test_line_with_a_wall_chord_is_blocked(ax: float, ay: float, bx: float, by: float):
-    crossed, inside_m = through(walls(), ax, ay, bx, by)
-    assert inside_m <= math.hypot(bx - ax, by - ay) + 1e-12
-    assume(inside_m == 0.0 or inside_m > 1e-9)  # `is_blocked` has other roundings
-    assert not crossed or is_blocked_on_floor(walls(), 0, ax, ay, bx, by)
-
-
-@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES, st.floats(-math.pi, math.pi), COORDINATES, COORDINATES)
-def test_wall_chords_are_invariant_under_rigid_motion(ax, ay, bx, by, turn, dx, dy):
-    c, s = math.cos(turn), math.sin(turn)
-
-    def moved(x: float, y: float) -> tuple[float, float]:
-        return c * x - s * y + dx, s * x + c * y + dy
-
-    x, y = moved(BOX.x_m, BOX.y_m)
-    box = Obstacle("box", x, y, heading_rad=turn, size_m=BOX.size_m)
-    moved_m = through(indexed(((box,),), SIZE_M), *moved(ax, ay), *moved(bx, by))[1]
-    original_m = through(indexed(((BOX,),), SIZE_M), ax, ay, bx, by)[1]
-    near_a_side = abs(abs(ax - 5.0) - 1.0) < 1e-6 and abs(ax - bx) < 1e-6
-    near_a_side |= abs(abs(ay) - 2.0) < 1e-6 and abs(ay - by) < 1e-6
-    assume(not near_a_side)  # along a side, rounding decides which side of it the line is
-    assert moved_m == pytest.approx(original_m, abs=1e-6)
 
 
 def bodies_on_floor(x: FloatArray, y: FloatArray, radius_m: FloatArray, cell_m: float, arenas: int) -> BodyParams:

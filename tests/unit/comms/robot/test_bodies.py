@@ -50,24 +50,6 @@ def test_body_like_another_is_named_by_its_sheet_or_file() -> None:
         load_body("roomba")
 
 
-@pytest.mark.parametrize(
-    ("name", "distance_m", "value"),
-    [
-        ("epuck", 0.005, 0.905),
-        ("epuck", 0.01, 0.743),
-        ("epuck", 0.02, 0.464),
-        ("epuck", 0.03, 0.244),
-        ("epuck", 0.04, 0.084),
-        ("footbot", 0.02, 0.4986),
-        ("footbot", 0.05, 0.2004),
-        ("footbot", 0.10, 0.1004),
-    ],
-)
-def test_proximity_response_matches_argos(name: str, distance_m: float, value: float) -> None:
-    digits = 3 if name == "epuck" else 4
-    assert round(float(proximity_of(name).response.value(np.float64(distance_m))), digits) == value
-
-
 @pytest.mark.parametrize("distance_m", [0.01, 0.02, 0.05])
 def test_epuck2_proximity_matches_its_driver(distance_m: float) -> None:
     # epuck_driver_cpp: the distance in m is 0.5 / sqrt(value), of 4095.
