@@ -361,6 +361,6 @@ def story(result: Run, robots: int, arena: int = 0) -> list[tuple[object, ...]]:
             rows.append((tick, "received", h.receiver[i] % robots, *columns_))
         columns = f.receiver, f.sender, f.sequence, f.fate, f.on_air_at_ns, f.final_at_ns
         rows += sorted((tick, "fate", *(column[i] for column in columns)) for i in np.flatnonzero(f.arena == arena))
-        asked = np.flatnonzero(t.row // robots == arena)
-        rows += [(tick, "status", t.row[i] % robots, t.id[i], t.result[i]) for i in asked]
+        own = np.flatnonzero(t.row // robots == arena)
+        rows += [(tick, "status", t.row[i] % robots, t.id[i], t.result[i]) for i in own]
     return [*rows, (*result.tally.fates[arena], result.tally.in_range[arena])]

@@ -20,6 +20,7 @@ from swarmwire.comms.radio.config.path_loss_models import (
     LossCurve,
     TwoRay,
 )
+from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.propagation.obstruction import BodyParams, bodies_between, is_on_line, wall_loss_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db, reach_m, rssi_dbm
@@ -144,6 +145,16 @@ def test_path_loss_is_constant_below_one_metre(model):
     curve = model.curve(2.44e9)
     assert loss_db(curve, 0.0) == loss_db(curve, 0.5) == loss_db(curve, 1.0)
     assert reach_m(curve, loss_db(curve, 1.0) - 1e-6) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "model"),
+    [("friis", Friis()), ("log-distance", LogDistance()), ("two-ray", TwoRay()), ("itu-indoor", ItuIndoor())],
+)
+def test_path_loss_model_is_chosen_by_name(name: str, model):
+    assert Radio(model=name).path_loss_model == model
+    with pytest.raises(ValueError, match="no path loss"):
+        _ = Radio(1.0).path_loss_model
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -189,7 +189,7 @@ def drain(inbox: RunnerInbox) -> list[tuple[str, bytes]]:
 
 
 @pytest.mark.parametrize(
-    ("limits", "puts", "kept"),
+    ("limits", "puts", "accepted"),
     [
         (JoinLimits(waiting=3), [("b", b"first"), *[("a", b"x")] * FLOOD, ("b", b"last")], [0, 1, 2, 3, -1]),
         # One frame of any size is accepted.
@@ -197,10 +197,10 @@ def drain(inbox: RunnerInbox) -> list[tuple[str, bytes]]:
     ],
     ids=["frames", "bytes"],
 )
-def test_inbox_flood_of_one_runner_does_not_block_another(session, limits, puts, kept: list[int]):
+def test_inbox_flood_of_one_runner_does_not_block_another(session, limits, puts, accepted: list[int]):
     inbox = inbox_after(session, limits, *puts)
-    assert drain(inbox) == [(f"answer/{puts[k][0]}", puts[k][1]) for k in kept]
-    assert inbox.counts() == {"flooded_frames": len(puts) - len(kept)}
+    assert drain(inbox) == [(f"answer/{puts[k][0]}", puts[k][1]) for k in accepted]
+    assert inbox.counts() == {"flooded_frames": len(puts) - len(accepted)}
 
 
 def test_inbox_names_the_runner_that_floods(session):
