@@ -147,14 +147,11 @@ def test_path_loss_is_constant_below_one_metre(model):
     assert reach_m(curve, loss_db(curve, 1.0) - 1e-6) == 0.0
 
 
-@pytest.mark.parametrize(
-    ("name", "model"),
-    [("friis", Friis()), ("log-distance", LogDistance()), ("two-ray", TwoRay()), ("itu-indoor", ItuIndoor())],
-)
-def test_path_loss_model_is_chosen_by_name(name: str, model):
-    assert Radio(model=name).path_loss_model == model
-    with pytest.raises(ValueError, match="no path loss"):
-        _ = Radio(1.0).path_loss_model
+def test_path_loss_model_has_default_parameters_and_a_unit_disk_none():
+    laws = {"log-distance": LogDistance(), "friis": Friis(), "two-ray": TwoRay(), "itu-indoor": ItuIndoor()}
+    assert {name: Radio(model=name).path_loss_model for name in laws} == laws
+    with pytest.raises(ValueError, match="model: a unit disk has no path loss"):
+        _ = Radio(2.0).path_loss_model
 
 
 @pytest.mark.parametrize("model", MODELS)
