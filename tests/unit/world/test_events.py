@@ -232,6 +232,7 @@ def test_jammer_is_on_for_its_duty_and_toggles_at_both_ends(duty: float):
     now = jammers.is_on(-1)
     toggled, which = jammers.toggles(0, 2_000_000)
     assert (np.diff(toggled) >= 0).all()
+    assert (len(toggled) == 0) == (duty == 1.0)
     for i, time_ns in enumerate(at_ns.tolist()):
         flips = np.bincount(which[toggled <= time_ns], minlength=2)
         np.testing.assert_array_equal(now ^ (flips % 2 == 1), is_on[i])
