@@ -107,10 +107,7 @@ def test_delivery_over_distance_matches_the_bit_errors_of_the_standard():
         if c.standard == "802.15.4":
             sinr = 10.0 ** (0.1 * (106.987 - 46.6777 - 30.0 * log10(c.size_m[0])))
             ber = (8 / 15) / 16 * sum((-1) ** k * comb(16, k) * exp(20.0 * sinr * (1 / k - 1)) for k in range(2, 17))
-            expected, sent = (
-                (1.0 - ber) ** (8 * 37),
-                c.seeds * c.measured_s * c.rate_hz,
-            )
+            expected, sent = ((1.0 - ber) ** (8 * 37), c.seeds * c.measured_s * c.rate_hz)
             error = (expected * (1.0 - expected) / sent) ** 0.5
             assert RECORD[c]["delivery"].mean() == pytest.approx(expected, abs=4.0 * error + 5e-5)
 

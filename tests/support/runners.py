@@ -61,13 +61,7 @@ class RawRunner:
     """Plays so many robots of a run in a thread of this process, until the run ends or it is closed."""
 
     def __init__(
-        self,
-        endpoint: str,
-        run_id: str,
-        name: str,
-        robots: int,
-        says: Says = honestly,
-        early: Sequence[bytes] = (),
+        self, endpoint: str, run_id: str, name: str, robots: int, says: Says = honestly, early: Sequence[bytes] = ()
     ) -> None:
         """`early` is what it says before it is ready."""
         self.keys, self.name, self._robots, self._says, self._early = Keys(run_id), name, robots, says, early

@@ -149,8 +149,7 @@ def test_tf_topic_of_each_robot_may_have_equal_frames():
     source = source_of(type=TF, topic="/{name}/tf", frame="base_footprint", parent="odom")
     with opened(source) as node:
         until_all_have_poses(
-            source,
-            lambda index, x_m: publish(node, f"flock_{index}/tf", transforms(("odom", "base_footprint", x_m))),
+            source, lambda index, x_m: publish(node, f"flock_{index}/tf", transforms(("odom", "base_footprint", x_m)))
         )
         assert rows_of(source) == EXPECTED
 

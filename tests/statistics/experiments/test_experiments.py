@@ -28,12 +28,7 @@ ROCK, PEBBLE = (
     [{"shape": "polygon", "points": [[0, tip], [half, -0.7], [half, 1], [-half, 1], [-half, -0.7]], "at": [0, 0]}]
     for half, tip in ((0.6, -1.6), (0.01, -0.71))
 )
-FEW = {
-    "arena.obstacles": [PEBBLE, ROCK],
-    "events.0.for_s": [20.0],
-    "events.0.at_s": [0.5],
-    "radio.loss": [0.0],
-}
+FEW = {"arena.obstacles": [PEBBLE, ROCK], "events.0.for_s": [20.0], "events.0.at_s": [0.5], "radio.loss": [0.0]}
 NAME = "minimalist-flocking"
 SMALL = [
     "duration_s=60",
@@ -41,11 +36,7 @@ SMALL = [
     "arena.lights.0.intensity=2.3",
     "robots.particles.params.update_every_ticks=40",
 ]
-FEW_POINTS = {
-    "radio.loss": [0.0, 0.8],
-    "radio.latency_s": [0.0, 5.0],
-    "robots.particles.params.inertia": [0.6, 0.8],
-}
+FEW_POINTS = {"radio.loss": [0.0, 0.8], "radio.latency_s": [0.0, 5.0], "robots.particles.params.inertia": [0.6, 0.8]}
 SHARES = (0.0, 0.2, 0.5)
 FEW_RESILIENCE = {
     "events": [[{"at_s": 0.0, "do": "kill", "robots": {"share": share}}] if share else [] for share in SHARES]
@@ -66,13 +57,7 @@ DURATION_S = {"avoidance": 40, "flocking": 26, "pso": 1}  # a search takes longe
 
 def test_consensus_decays_by_the_formula_and_losses_bias_it(tmp_path) -> None:
     """Three standard errors of 60 seeds: of six points one is beyond by luck in 2 % of all sets of seeds."""
-    small = miniature(
-        "consensus",
-        tmp_path,
-        seeds=60,
-        vary={"radio.loss": [0.0, 0.5]},
-        overrides=["duration_s=17"],
-    )
+    small = miniature("consensus", tmp_path, seeds=60, vary={"radio.loss": [0.0, 0.5]}, overrides=["duration_s=17"])
     for campaign, name, range_m in (("consensus", "consensus", 0.8), ("consensus-random", "consensus-random", None)):
         runs, graph = small.runs[campaign], graph_of(SCENARIOS / f"{name}.toml", range_m)
         for loss in (0.0, 0.5):

@@ -186,11 +186,7 @@ class OwnWireRig(Rig):
 
 def readings(turn_radps: float) -> Fields:
     """The IMU of a robot that turns at this rate."""
-    return {
-        "imu.forward_mps2": np.zeros(1),
-        "imu.left_mps2": np.zeros(1),
-        "imu.turn_radps": np.array([turn_radps]),
-    }
+    return {"imu.forward_mps2": np.zeros(1), "imu.left_mps2": np.zeros(1), "imu.turn_radps": np.array([turn_radps])}
 
 
 def opened(driver: Driver) -> bool:

@@ -16,16 +16,7 @@ from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.robot.packets import ReceivedPackets, SentPackets
 from tests.support.agent.hosts import group, readings, received_from
 from tests.support.agent.one_step import agent_doing, vector_agent_doing
-from tests.support.agent.players import (
-    Ageing,
-    Crowd,
-    Means,
-    Neighbour,
-    Remembering,
-    Reply,
-    VectorCounter,
-    Word,
-)
+from tests.support.agent.players import Ageing, Crowd, Means, Neighbour, Remembering, Reply, VectorCounter, Word
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "flocking_agent.py"
 TRIALS = [Trial(), Trial(robots=1), Trial(robots=40, ticks=8, seed=7, body="footbot")]

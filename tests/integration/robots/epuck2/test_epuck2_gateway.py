@@ -218,11 +218,7 @@ def steps(robot: socket.socket) -> tuple[int, int]:
 
 @pytest.mark.parametrize(
     ("fields", "count"),
-    [
-        ({"settings": 1}, "calibration_refused"),
-        ({"settings": 2}, "avoidance_refused"),
-        ({"sound": 4}, "sound_refused"),
-    ],
+    [({"settings": 1}, "calibration_refused"), ({"settings": 2}, "avoidance_refused"), ({"sound": 4}, "sound_refused")],
 )
 def test_unsupported_parts_of_a_command_are_counted_once_and_others_apply(
     gateway: Epuck2Gateway, fields: dict[str, int], count: str

@@ -14,15 +14,7 @@ from swarmwire.metrics.real.radio_fit.logs import loss_sequences, read_log
 from swarmwire.metrics.real.radio_fit.losses import LossFit, expected_runs, fit_losses
 from swarmwire.metrics.real.radio_fit.path_loss import PathLossFit
 from swarmwire.metrics.real.radio_fit.shadowing import ShadowingFit, link_covariance
-from tests.support.metrics.radio import (
-    EXPONENT,
-    NOISE_DB,
-    RSSI_AT_1_M_DBM,
-    csv_of,
-    losses,
-    made,
-    sequences,
-)
+from tests.support.metrics.radio import EXPONENT, NOISE_DB, RSSI_AT_1_M_DBM, csv_of, losses, made, sequences
 
 STANDARD_ERRORS = 4.0
 SHADOWING = Shadowing(4.0, 5.0)

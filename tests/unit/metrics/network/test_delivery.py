@@ -32,13 +32,7 @@ def test_fates_add_up_to_the_intended_receivers_with_what_was_in_flight():
         {"tally": tally({Fate.RECEIVED: 1, Fate.BLOCKED: 4}, {})},
     ]
     first, second = tallied(static(arenas=2), *ticks, last=tally({Fate.IN_FLIGHT: 5}, {Fate.IN_FLIGHT: 1}, sent=0))
-    assert first["fates"] == {
-        **dict.fromkeys(FATE_NAMES, 0),
-        "received": 7,
-        "lost": 2,
-        "blocked": 4,
-        "in_flight": 5,
-    }
+    assert first["fates"] == {**dict.fromkeys(FATE_NAMES, 0), "received": 7, "lost": 2, "blocked": 4, "in_flight": 5}
     assert sum(first["fates"].values()) == first["intended"] == 18
     assert sum(second["fates"].values()) == second["intended"] == 4
     assert first["sent"] == 2

@@ -83,7 +83,7 @@ def find_times(x_m, alive=None, within_m=0.5, lights=LIGHTS_OF_ARENAS, share=0.0
 
 def test_find_time_is_when_the_first_robot_reached_a_light_and_stays():
     values, summary = find_times(
-        [[0, 0, 4, 1, 0, 0], [1, 1.5, 4, 4, 0, 0], [1, 0, 0.51, 4, 0, 0], [2, -3, 0.49, 4, 0, 0]],
+        [[0, 0, 4, 1, 0, 0], [1, 1.5, 4, 4, 0, 0], [1, 0, 0.51, 4, 0, 0], [2, -3, 0.49, 4, 0, 0]]
     )
     nan = np.nan
     expected = [[nan, nan, nan], [0.1, nan, nan], [0.1, nan, nan], [0.1, 0.3, nan]]
