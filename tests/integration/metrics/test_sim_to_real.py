@@ -5,11 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import RunFolder, sweep
 from swarmwire.deploy.campaigns import sweep as sweeping
-from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.measures.network.latency import RadioTally
 from swarmwire.metrics.measures.registry import METRICS
 from swarmwire.metrics.real.real_log.real_logs import read_real_logs
 from swarmwire.metrics.real.sim_to_real.comparison import (
@@ -39,7 +36,8 @@ from swarmwire.metrics.real.sim_to_real.runs import (
 from swarmwire.metrics.records.campaign.folder import select
 from tests.support.deploy.campaign import InThisProcess
 from tests.support.deploy.runs import LOSSY
-from tests.support.metrics.real_logs import BEGAN_S, SMALL, Watched, as_logs, watched
+from tests.support.metrics.real_logs import BEGAN_S, SMALL, Watched, as_logs, measured_run, watched
+from tests.support.refusals import refused_input
 
 NAMES = (
     "order",
@@ -60,16 +58,8 @@ METRIC_NAMES = ("order", "min_gap")
 
 
 def emulated_run(watched_run: Watched, seed: int) -> EmulatedRun:
-    metrics, tally = Metrics(MEASURES), RadioTally()
-    values = []
-    for observer in (metrics, tally):
-        observer.begin(watched_run.static)
-    for truth in watched_run.truths:
-        metrics.see(truth)
-        tally.see(truth)
-        values.append(metrics.values[:, 0].copy())
-    series = dict(zip(NAMES, np.array(values).T, strict=True))
-    return EmulatedRun(seed, series, tally.end(None)["radio"][0], len(watched_run.truths) / watched_run.static.rate_hz)
+    series, radio = measured_run(watched_run, MEASURES)
+    return EmulatedRun(seed, series, radio, len(watched_run.truths) / watched_run.static.rate_hz)
 
 
 @pytest.fixture(scope="module")
@@ -251,7 +241,7 @@ def test_verdict_on_two_runs_has_no_spread(runs, tmp_path):
     assert verdict(comparison).startswith("2 runs ")
 
 
-def test_metric_row_has_a_text_for_each_column():
+def test_row_of_a_metric_or_the_radio_has_a_text_for_each_column_and_of_a_single_run_no_spread():
     row = MetricRow(
         METRICS["min_gap"](), Spread(0.1, 0.2, 0.3), 0.25, (NOTHING,), NOTHING, ks=0.125, distance=0.05, reach=0.04
     )
@@ -261,18 +251,12 @@ def test_metric_row_has_a_text_for_each_column():
     assert (cells["log"], cells["distance"], cells["spread"], cells["KS"]) == ("0.25", "0.05", "0.04", "0.125")
     assert cells["within"] == "no"
 
-
-def test_metric_row_of_a_single_run_has_a_value_and_no_spread():
-    row = MetricRow(METRICS["order"](), Spread(0.5, 0.5, 0.5), 0.5, (NOTHING,), NOTHING, ks=0.0, distance=0.0)
-    cells = dict(zip(COLUMNS, metric_cells(row), strict=True))
+    single = MetricRow(METRICS["order"](), Spread(0.5, 0.5, 0.5), 0.5, (NOTHING,), NOTHING, ks=0.0, distance=0.0)
+    cells = dict(zip(COLUMNS, metric_cells(single), strict=True))
     assert cells["emulated"] == "0.5"
     assert cells["within"] not in ("yes", "no")
-
-
-def test_radio_row_has_a_text_for_each_column():
     value = RadioValue("latency, median", "s", "how long", (0.01, 0.02, 0.03), log=0.02, grain=0.0)
-    row = RadioRow(value, Spread(0.01, 0.02, 0.03), 3)
-    cells = dict(zip(RADIO_COLUMNS, radio_cells(row), strict=True))
+    cells = dict(zip(RADIO_COLUMNS, radio_cells(RadioRow(value, Spread(0.01, 0.02, 0.03), 3)), strict=True))
     assert cells["radio"] == "latency, median [s]"
     assert (cells["log"], cells["within"]) == ("0.02", "yes")
 
@@ -296,6 +280,5 @@ def test_runs_of_a_campaign_point_have_its_series(tmp_path, monkeypatch):
     assert all(len(run.series["order"]) == 30 for run in emulated.runs)
     first, *_ = (tmp_path / "c" / "series").glob("*.parquet")
     first.write_bytes(first.read_bytes()[:-1])
-    with pytest.raises(BadInput) as error:
+    with refused_input(first):
         runs_of_campaign(select(f"{tmp_path / 'c'}@radio.loss=0.6"), METRIC_NAMES, 10, 6)
-    assert error.value.where == str(first)

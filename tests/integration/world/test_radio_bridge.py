@@ -159,18 +159,6 @@ def test_bridge_delivers_packets_and_tx_status_to_each_robot():
         assert (packets.receiver.tolist(), packets.sequence.tolist(), tx_status.id.tolist()) == ([2], [8], [5])
 
 
-def test_bridge_sends_no_frame_without_packets(monkeypatch):
-    with bridged() as (bridge, _):
-        published: list[int] = []
-        encode = "swarmwire.world.gateways.radio_bridge.encode_bridged"
-        monkeypatch.setattr(encode, lambda *_: published.append(1) or b"")
-        bridge.publish(1, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
-        bridge.publish(2, received((0, 1, 1, 1)), NO_TX_STATUSES)  # no receiver behind the bridge
-        assert not published
-        bridge.publish(3, received((1, 0, 1, 1), (1, 2, 2, 2), (2, 0, 3, 3)), NO_TX_STATUSES)
-        assert len(published) == 2
-
-
 def test_reception_times_follow_the_clock_of_the_agent():
     with bridged() as (bridge, session):
         log, clock = KeptLog(), DatedClock()

@@ -5,10 +5,9 @@ import io
 import polars as pl
 import pytest
 from rich.console import Console
-from typer.testing import CliRunner
 
 from docs.experiments.__main__ import app
-from docs.experiments.experiment import LAYOUT, find_experiment, names
+from docs.experiments.experiment import find_experiment, names
 from docs.experiments.making import digest, digests, draw, run, run_app
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.sweep import ExecutionOptions
@@ -134,12 +133,3 @@ def test_experiment_errors_are_one_line(monkeypatch, capsys):
         run_app(app)
     assert ended.value.code == 2
     assert capsys.readouterr().err.startswith("error: NAME: no-such: unknown experiment")
-
-
-def test_experiment_commands_have_help_and_list():
-    runner = CliRunner()
-    numbers = runner.invoke(app, ["--help"]).output
-    assert all(command in numbers for command in ("list", "draw", "digest", "run"))
-    assert "--seeds" in runner.invoke(app, ["run", "--help"], env={"NO_COLOR": "1"}).output
-    listed = runner.invoke(app, ["list"]).output
-    assert all(f"{name}: " in listed for name in names(LAYOUT))

@@ -1,12 +1,13 @@
 """Behaviours in a world of one robot."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.behaviours import PsoSearchPositioned
-from swarmwire.agent.behaviours.pso.core import Particle, ParticleSwarm
+from swarmwire.agent.behaviours.pso.core import ParticleSwarm
 from swarmwire.agent.behaviours.pso.variants import BestPlace
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.robot.messages import Message
@@ -18,42 +19,67 @@ START = (1.0, -2.0)
 RAYS_RAD = np.deg2rad([17.0, 50.0, 90.0, 150.0, 210.0, 270.0, 310.0, 343.0])
 
 
-class SingleParticle:
-    """A particle; each step has readings and received bests: the first from robot 1, the next from 2, …"""
+class OneRobot:
+    """A robot of this body alone, whose tests say what it reads and receives in each step."""
 
-    def __init__(self, kind: type[ParticleSwarm[Any]] = PsoSearchPositioned, **params: Any) -> None:
-        self.tick, self.position = 0, START
-        self.wheels_m, self.heading_rad, self.brightness = [5.0, 6.0], 0.0, 0.1
-        self.rays = np.zeros(8)
-        self._agents = agent_group(group("", [0], body="epuck-gps", params=dict(params)), kind)
+    def __init__(self, kind: type[VectorAgent[Any]], body: str, period_ns: int = 10**8, **params: Any) -> None:
+        self.tick, self._period_ns = 0, period_ns
+        self._agents = agent_group(group("", [0], body=body, params=params), kind)
 
-    def step(self, *bests: Message, range_m: float = 0.0, bearing_rad: float = 0.0) -> Actions:
-        k = len(bests)
-        zeros = np.zeros(k, np.int64)
-        measured = {"range_m": np.full(k, range_m), "bearing_rad": np.full(k, bearing_rad)}
-        payloads = Payloads.from_rows([best.encode() for best in bests])
-        received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, measured, np.arange(k), payloads)
-        fields = {
-            "proximity.value": self.rays[None, :],
-            "compass.heading_rad": np.array([self.heading_rad]),
-            "odometry.left_m": np.array([self.wheels_m[0]]),
-            "odometry.right_m": np.array([self.wheels_m[1]]),
-            "light.value": np.full((1, 8), self.brightness / 8.0),
-            "positioning.x_m": np.array([self.position[0]]),
-            "positioning.y_m": np.array([self.position[1]]),
-        }
+    def act(
+        self,
+        readings: Mapping[str, Any],
+        messages: Sequence[Message] = (),
+        at: Sequence[tuple[float, float]] = (),
+        late_ns: int = 0,
+    ) -> Actions:
+        """Step with readings by sensor and field, and messages of robots 1, 2, … at ranges in m and bearings in rad."""
+        k, now_ns = len(messages), self.tick * self._period_ns
+        zeros, places = np.zeros(k, np.int64), np.array(at or [(0.0, 0.0)] * k, np.float64).reshape(-1, 2)
+        measured = {"range_m": places[:, 0], "bearing_rad": places[:, 1]}
+        payloads = Payloads.from_rows([message.encode() for message in messages])
+        received = ReceivedPackets(
+            zeros, np.arange(1, k + 1), zeros + self.tick, zeros + now_ns - late_ns, measured, np.arange(k), payloads
+        )
+        fields = {name: np.array(value, np.float64)[None] for name, value in readings.items()}
         actions = self._agents.act(
-            (self.tick, self.tick * 10**8, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received
+            (self.tick, now_ns, self._period_ns), GroupReadings(np.zeros(1, np.int64), fields), received
         )
         self.tick += 1
         return actions
 
-    def steps(self, count: int) -> list[Actions]:
-        return [self.step() for _ in range(count)]
+    def command(self, *seen: Any, **more: Any) -> tuple[float, float]:
+        """Forward speed and turn rate of a step, which `act` describes."""
+        actions = self.act(*seen, **more)
+        return float(actions.linear_mps[0]), float(actions.angular_radps[0])
 
     @property
-    def memory(self) -> Particle:
+    def memory(self) -> Any:
         return self._agents._memory
+
+
+class SingleParticle(OneRobot):
+    """A particle; each step has readings and received bests: the first from robot 1, the next from 2, …"""
+
+    def __init__(self, kind: type[ParticleSwarm[Any]] = PsoSearchPositioned, **params: Any) -> None:
+        super().__init__(kind, "epuck-gps", **params)
+        self.position, self.wheels_m, self.heading_rad, self.brightness = START, [5.0, 6.0], 0.0, 0.1
+        self.rays = np.zeros(8)
+
+    def step(self, *bests: Message, range_m: float = 0.0, bearing_rad: float = 0.0) -> Actions:
+        readings = {
+            "proximity.value": self.rays,
+            "compass.heading_rad": self.heading_rad,
+            "odometry.left_m": self.wheels_m[0],
+            "odometry.right_m": self.wheels_m[1],
+            "light.value": np.full(8, self.brightness / 8.0),
+            "positioning.x_m": self.position[0],
+            "positioning.y_m": self.position[1],
+        }
+        return self.act(readings, bests, [(range_m, bearing_rad)] * len(bests))
+
+    def steps(self, count: int) -> list[Actions]:
+        return [self.step() for _ in range(count)]
 
     def vector(self, name: str) -> tuple[float, float]:
         return float(getattr(self.memory, f"{name}_x")[0]), float(getattr(self.memory, f"{name}_y")[0])

@@ -14,6 +14,9 @@ from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import run
+from swarmwire.metrics.measures.measure import Metrics
+from swarmwire.metrics.measures.metric import Metric
+from swarmwire.metrics.measures.network.latency import RadioTally
 from tests.support.deploy.runs import LOSSY
 
 BEGAN_S = 1_767_225_600.0
@@ -132,6 +135,20 @@ def watched(*overrides: str, seed: int = 1, out: Path | None = None) -> Watched:
     return observer
 
 
+def measured_run(watched: Watched, metrics: Sequence[Metric]) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """The series of metrics of a run by name, and its account of the radio."""
+    observer, tally = Metrics(metrics), RadioTally()
+    values: list[np.ndarray] = []
+    for each in (observer, tally):
+        each.begin(watched.static)
+    for truth in watched.truths:
+        observer.see(truth)
+        tally.see(truth)
+        values.append(observer.values[:, 0].copy())
+    series = dict(zip((metric.name for metric in metrics), np.array(values).T, strict=True))
+    return series, tally.end(None)["radio"][0]
+
+
 @cache
 def flock() -> Watched:
     """The same run for all tests: everybody is in range."""
@@ -174,14 +191,9 @@ def as_bag(logs: Path, to: Path, *, commands: bool = True, packets: bool = True,
                     (at_ns + (kind != "Twist") * 10**9, f"/{name}/cmd_vel", f"geometry_msgs/msg/{kind}", twist)
                 )
         for row in (*sent, *received) if packets else ():
-            text: dict[str, Any] = {
-                "t_s": float(row["t_s"]),
-                "seq": int(row["seq"]),
-                "size_bytes": int(row["size_bytes"]),
-            }
-            text |= {
-                key: row[key].replace("-", "_") for key in ("tx", "to") if row[key] and (key == "to" or "rx" in row)
-            }
+            text: dict[str, Any] = {"t_s": float(row["t_s"])} | {key: int(row[key]) for key in ("seq", "size_bytes")}
+            ends = {"to": row["to"], "tx": row["tx"] if "rx" in row else ""}
+            text |= {key: name.replace("-", "_") for key, name in ends.items() if name}
             packet, first_text = make["String"](first_text or json.dumps(text)), ""
             messages.append((round(float(row["t_s"]) * 1e9), f"/{name}/packets", "std_msgs/msg/String", packet))
     with Writer(to, version=9, storage_plugin=StoragePlugin.MCAP) as writer:

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmwire.agent import behaviours
-from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.behaviours import (
     Aggregation,
     Avoidance,
@@ -35,9 +34,7 @@ from swarmwire.agent.testing import Trial, assert_rows_independent
 from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
-from swarmwire.comms.robot.tick_io import GroupReadings
-from tests.support.agent.hosts import group
+from tests.support.agent.behaviours import OneRobot
 
 FOOTBOT = load_body("footbot")
 TURN_RADPS = 0.05 / 0.14  # one wheel at 5 cm/s on a base of 14 cm
@@ -64,6 +61,7 @@ NOT_NEGATIVE: dict[type, tuple[str, ...]] = {
     BeaconAvoidance: ("smooth_s",),
     MinimalistFlocking: ("avoid_diameters", "separation_diameters", "lateral_diameters", "rear_diameters"),
     SmoothedAvoidance: ("smooth_s",),
+    SmoothedAvoidanceProximity: ("smooth_s",),  # a subclass keeps the checks
 }
 
 
@@ -84,17 +82,11 @@ def command(
     **params: float,
 ) -> tuple[float, float]:
     """Forward speed and turn rate of one foot-bot; `neighbours` are range, bearing and heading."""
-    table = np.array(neighbours or [], np.float64).reshape(-1, 3)
-    k = len(table)
-    payloads = Payloads.from_rows([Heading(heading_rad=float(h)).encode() for h in table[:, 2]])
-    zeros = np.zeros(k, np.int64)
-    given_columns = {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
-    received = ReceivedPackets(zeros, np.arange(1, k + 1), zeros, zeros, given_columns, np.arange(k), payloads)
-    fields = {"proximity.value": value[None, :], "compass.heading_rad": np.array([heading])}
-    agents = agent_group(group("", [0], body="footbot", params=dict(params)), kind)
-    actions = agents.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received)
-    assert actions.drive.all()
-    return float(actions.linear_mps[0]), float(actions.angular_radps[0])
+    others = neighbours or []
+    messages = [Heading(heading_rad=float(other_rad)) for _, _, other_rad in others]
+    at = [(range_m, bearing_rad) for range_m, bearing_rad, _ in others]
+    readings = {"proximity.value": value, "compass.heading_rad": heading}
+    return OneRobot(kind, "footbot", **params).command(readings, messages, at)
 
 
 @pytest.mark.parametrize(
@@ -326,10 +318,6 @@ def test_hysteresis_order_is_checked_with_defaults(kind, lower, upper, low, high
     assert refused(kind, {lower: 2 * high}, f"expected at most {upper}, {high}; got {2 * high}") == lower
     assert refused(kind, {upper: low / 2}, f"expected at most {upper}, {low / 2}; got {low}") == lower
     checked_parameters(kind, {lower: 2 * high, upper: 2 * high})
-
-
-def test_subclass_keeps_the_checks_with_its_own_defaults() -> None:
-    assert refused(SmoothedAvoidanceProximity, {"smooth_s": -0.1}, "at least 0") == "smooth_s"
 
 
 @pytest.mark.parametrize("kind", [getattr(behaviours, name) for name in behaviours.__all__])

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import onnx
@@ -17,6 +18,8 @@ from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.bodies.body import load_body
 from swarmwire.deploy import Recording, Simulation, repeat
 from swarmwire.deploy.learn import vector_env
+from swarmwire.deploy.runs.config import RunConfig
+from swarmwire.deploy.runs.plan import make_plan
 from tests.support.agent.policies import FLOCKING, network, result, saved
 from tests.support.refusals import refused_input
 
@@ -26,9 +29,18 @@ OBSERVATION = np.sin(np.arange(40 * 7) * 0.3).reshape(40, 7).astype(np.float32)
 SHORT = ("duration_s=2", "robots.flock.params={}")
 
 
+@pytest.fixture(scope="module")
+def trained() -> bytes:
+    """A policy's file."""
+    with TemporaryDirectory() as folder:
+        return saved(Path(folder) / "flock.onnx").read_bytes()
+
+
 @pytest.fixture
-def policy(tmp_path: Path) -> Path:
-    return saved(tmp_path / "flock.onnx")
+def policy(tmp_path: Path, trained: bytes) -> Path:
+    path = tmp_path / "flock.onnx"
+    path.write_bytes(trained)
+    return path
 
 
 def of_agent(path: Path) -> tuple[str, ...]:
@@ -58,21 +70,18 @@ def test_network_without_separate_rows_is_called_per_robot(kind: str) -> None:
     np.testing.assert_allclose(alone(OBSERVATION), expected, atol=1e-5)
 
 
-def test_run_with_a_policy_equals_the_episode_of_its_network(policy: Path) -> None:
-    with Simulation(SCENARIO, seed=3, overrides=of_agent(policy)) as run:
+def test_run_with_a_policy_equals_the_episode_of_its_network_and_is_repeated_from_its_folder(
+    policy: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    with Simulation(SCENARIO, seed=3, overrides=of_agent(policy), out=folder, record=Recording(rrd=False)) as run:
         run.run()
     envs = vector_env(SCENARIO, arenas=1, seed=3, neighbours=FLOCKING.neighbours, overrides=SHORT)
-    trained = PolicyNetwork(policy.read_bytes(), "here")
+    network_of_file = PolicyNetwork(policy.read_bytes(), "here")
     observations, _ = envs.reset()
     for _ in range(20):
-        observations, *_ = envs.step(trained(observations[0])[None])
+        observations, *_ = envs.step(network_of_file(observations[0])[None])
     assert list(envs.trajectory_sha256) == run.hashes()
-
-
-def test_policy_file_is_saved_with_the_run_and_repeats_it(policy: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "run"
-    with Simulation(SCENARIO, overrides=of_agent(policy), out=folder, record=Recording(rrd=False)) as run:
-        run.run()
     sha256 = hashlib.sha256(policy.read_bytes()).hexdigest()
     facts = json.loads((folder / "run.json").read_text())
     assert {"path": "files/flock.onnx", "sha256": sha256, "what": "agent"} in facts["files"]
@@ -100,7 +109,7 @@ def test_policy_file_with_other_contents_is_another_agent(policy: Path) -> None:
 def test_policy_outside_its_training_is_refused_in_one_line(tmp_path: Path, body: str, radio: str, fault: str) -> None:
     path = saved(tmp_path / "flock.onnx", body)
     with refused_input(key="robots.flock.agent", match=fault):
-        Simulation(SCENARIO, overrides=[*of_agent(path), f"radio.measures={radio}"])
+        make_plan(RunConfig(SCENARIO, overrides=(*of_agent(path), f"radio.measures={radio}")))
 
 
 def test_malformed_policy_files_are_refused(tmp_path: Path) -> None:

@@ -19,22 +19,16 @@ from swarmwire.agent.runner_protocol import Ended, RunnerProtocol
 from swarmwire.comms.base.errors import RunnerLost
 from swarmwire.comms.robot.packets import NO_TX_STATUSES
 from swarmwire.comms.wire import frames
-from swarmwire.comms.wire.agent_memory import encode_memory
 from swarmwire.comms.wire.keys import Keys
-from swarmwire.comms.wire.tick_frames import encode_packets, encode_tick
-from tests.support.agent.hosts import SILENCE, TIMES, assignment, group, readings, received_from, spec, words
-from tests.support.agent.processes import layouts_of, thread_server
+from swarmwire.comms.wire.tick_frames import encode_tick
+from tests.support.agent.hosts import SILENCE, TIMES, assignment, group, readings, spec
+from tests.support.agent.processes import thread_server
 from tests.support.refusals import refused_input
 
 KEYS = Keys("run1")
 END = frames.encode("end", -1, {})
-
-
-def reply(agent: str, memory: bytes | None = None) -> bytes:
-    assigned = assignment(group(spec(agent), [0]))
-    columns = None if memory is None else layouts_of(assigned)
-    memories = {"memory": memory, "memory_columns": columns}
-    return msgpack.packb({**assigned.as_mapping(), "v": frames.VERSION, **memories, **TIMES})
+ASSIGNED = assignment(group(spec("Counter"), [0]))
+REPLY = msgpack.packb({**ASSIGNED.as_mapping(), "v": frames.VERSION, "memory": None, **TIMES})
 
 
 def tick(number: int) -> bytes:
@@ -67,12 +61,12 @@ class FakeSession:
     The world's token appears with the `found`-th subscription to it.
     """
 
-    def __init__(self, *then: bytes, replies: Sequence[Reply] = (Reply(Sample(Payload(reply("Counter")))),)) -> None:
+    def __init__(self, *then: bytes) -> None:
         self.found_at, self.declared, self.undeclared = 1, 0, 0
         self.put_to_world: list[frames.Frame] = []
         self.before_reply: tuple[bytes, ...] = ()
         self.on_put: Callable[[frames.Frame], object] = lambda _: None
-        self.then, self._replies = list(then), replies
+        self.then = list(then)
         self._frame: Any = None
 
     def liveliness(self) -> "FakeSession":
@@ -98,7 +92,7 @@ class FakeSession:
         assert (key, bool(payload), timeout > 0.0) == (KEYS.join("r7"), True, True)
         for data in self.before_reply:
             self._frame(Sample(Payload(data)))
-        return self._replies
+        return (Reply(Sample(Payload(REPLY))),)
 
     def declare_publisher(self, key: str, **_qos: Any) -> "FakeSession":
         assert key == KEYS.answer("r7")
@@ -169,51 +163,6 @@ def test_runner_without_a_report_of_its_world_queries_again(
     else:
         assert played(session) == Ended("over")
     assert (session.declared, session.undeclared) == (declared, undeclared)
-
-
-@pytest.mark.parametrize(
-    ("replies", "why"),
-    [
-        ((Reply(None, Sample(Payload(b"Timeout"))),), "the world did not answer to join within"),
-        ((Reply(None, Sample(Payload(b"no robots are free"))),), "no robots are free"),
-        ((), "the world did not answer to join"),
-        ((Reply(Sample(Payload(b"\xc1"))),), "the world's answer to join is malformed"),
-    ],
-)
-def test_world_that_assigns_no_robots_is_named_with_its_reason(replies: Sequence[Reply], why: str) -> None:
-    with pytest.raises(RunnerLost, match=why) as lost:
-        played(FakeSession(replies=replies))
-    assert lost.value.runner == "r7"
-
-
-@pytest.mark.parametrize("agent", ["Failing", "Nowhere"])
-def test_failed_agents_are_reported_in_a_frame_before_the_end(agent: str) -> None:
-    session = FakeSession(*map(tick, range(9)), END, replies=(Reply(Sample(Payload(reply(agent)))),))
-    session.on_put = lambda frame: session.then.__setitem__(slice(None), [END]) if frame.kind == "lost" else None
-    assert played(session) == Ended("over")
-    (failed,) = (frame for frame in session.put_to_world if frame.kind == "lost")
-    assert failed.values["robots"] == "flock-0"
-    assert "Traceback" in failed.values["traceback"]
-
-
-def test_agents_read_packets_between_ticks_and_answer_them() -> None:
-    session = FakeSession(
-        tick(0),
-        encode_packets(0, 1_000, 0, received_from(words(1, 2), [0]), NO_TX_STATUSES),
-        END,
-        replies=(Reply(Sample(Payload(reply("Echo")))),),
-    )
-    assert played(session) == Ended("over")
-    assert kinds(session) == [("ready", -1), ("actions", 0), ("sent", 0)]
-    assert session.put_to_world[-1].arrays["sent"].shape == (2, 2)
-
-
-@pytest.mark.parametrize("keeps", [True, False])
-def test_answers_carry_agents_memory_if_the_world_keeps_it(keeps: bool) -> None:
-    memory = encode_memory({}) if keeps else None
-    session = FakeSession(tick(0), END, replies=(Reply(Sample(Payload(reply("VectorCounter", memory)))),))
-    assert played(session) == Ended("over")
-    assert ("memory/flock/rows" in session.put_to_world[-1].arrays) == keeps
 
 
 @pytest.mark.parametrize(

@@ -28,17 +28,12 @@ pytest.importorskip("matplotlib", reason="needs the extra [report]")
 def test_body_drawing_exists_for_every_shipped_body(tmp_path, name):
     from PIL import Image
 
+    names = [fact for fact, _ in facts_of(load_body(name)) if fact]
+    assert len(names) == len(set(names))
     draw_body(load_body(name), tmp_path / "a.png")
     with Image.open(tmp_path / "a.png") as image:
         assert max(image.size) == 900
         assert len(np.unique(np.asarray(image).reshape(-1, 4), axis=0)) > 50
-
-
-def test_body_without_any_sensor_can_be_drawn(tmp_path):
-    drive = {"wheel_base_m": 0.1, "max_wheel_mps": 0.2, "max_force_n": 1.0, "max_torque_nm": 1.0}
-    sheet = {"name": "bare", "source": "a test", "radius_m": 0.1, "height_m": 0.1, "mass_kg": 1.0, "drive": drive}
-    draw_body(body_from(sheet, "bare.toml"), tmp_path / "a.svg")
-    assert (tmp_path / "a.svg").read_text().startswith("<?xml")
 
 
 def test_rays_start_at_the_rim_and_end_at_their_range_with_the_front_up():
@@ -78,28 +73,16 @@ def test_body_facts_are_those_of_the_data_sheet():
     assert numbers["wheels"] == ["5.3 cm"]
     assert numbers["proximity"] == ["8 rays", "10 cm"]
     assert numbers["odometry"] == ["5 %", "0.13 mm"]
-    assert "positioning" not in facts
+    assert not {"positioning", "flies"} & facts.keys()
     assert "1 cm" in dict(facts_of(load_body("epuck-gps")))["positioning"]
-
-
-def test_body_facts_have_distinct_names():
-    for name in body_names():
-        names = [fact for fact, _ in facts_of(load_body(name)) if fact]
-        assert len(names) == len(set(names)), name
-    assert dict(facts_of(load_body("footbot")))["LEDs"].startswith("13")
 
 
 def test_own_senses_and_actuators_are_facts_by_their_class():
     sheet = {"like": "epuck", "name": "sealer", "actuators": {"sealer": {"kind": "gas.py:Sealer"}}}
     sheet["sensors"] = {"gas": {"kind": "gas.py:Sniffer"}}
-    facts = dict(facts_of(body_from(sheet, "sealer.toml")))
+    facts = dict(facts_of(body_from({**sheet, "altitude_m": 1.0}, "sealer.toml")))
+    assert "1 m" in facts["flies"]
     assert [facts[name].split()[-1] for name in ("gas", "sealer")] == ["gas.py:Sniffer", "gas.py:Sealer"]
-
-
-def test_body_facts_have_an_altitude_only_for_bodies_that_fly():
-    flying = body_from({"like": "epuck", "name": "flying", "altitude_m": 1.0}, "flying.toml")
-    assert "1 m" in dict(facts_of(flying))["flies"]
-    assert "flies" not in dict(facts_of(load_body("epuck")))
 
 
 def test_picture_size_that_is_too_large_is_refused():

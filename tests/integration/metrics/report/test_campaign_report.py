@@ -1,10 +1,7 @@
 """Reports of campaigns."""
 
-import html
 import json
 import math
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
@@ -36,19 +33,6 @@ COUNTS = [5, 10, 20]
 FEW = (1, 2, 3, 4, 5, 6)
 NONE = (np.nan, np.nan, np.nan)
 BEYOND = (np.inf, np.inf, np.inf)
-PHONE_PX = 390
-# The window of a browser without a screen is wider than a phone: a frame is not.
-FRAME = """<!doctype html><body>
-<iframe id="phone" style="border:0;width:{width}px;height:800px" srcdoc="{page}"></iframe>
-<script>
-document.getElementById("phone").onload = (event) => {{
-  const inside = event.target.contentDocument.documentElement;
-  const wide = [...inside.querySelectorAll("main *:not(.scroll *)")]
-    .filter((element) => element.getBoundingClientRect().right > {width} + 0.5);
-  document.body.textContent = `is ${{inside.scrollWidth}} of ${{inside.clientWidth}} px, beyond: ` +
-    wide.map((element) => element.tagName).join(" ");
-}};
-</script>"""
 
 
 def report_of(folder, responses=()):
@@ -179,12 +163,6 @@ def test_limit_of_a_time_is_not_rounded_up_beyond_what_was_observed(tmp_path):
     assert [row[3] for row in shown.table("who", "n")][-1] == "> 2.6 s"
 
 
-def test_without_times_nothing_is_said_of_survival(tmp_path):
-    sections, shown = report_of(ordinary(tmp_path, times={}))
-    assert "Survival" not in sections
-    assert not any("Kaplan" in text for text in shown.texts)
-
-
 def test_failed_and_missing_runs_are_told_with_what_to_do(tmp_path):
     folder = ordinary(tmp_path, failed=(3, 4, 20), missing=(7, 8), parts=3)
     _, shown = report_of(folder)
@@ -214,15 +192,13 @@ def test_seeds_are_told_to_the_last_digit(tmp_path):
     assert ["seeds", "20240501, 7"] in shown.table("scenario")
 
 
-def test_before_any_run_has_ended_there_is_a_report_all_the_same(tmp_path):
-    sections, _ = report_of(ordinary(tmp_path, missing=range(24), parts=1))
-    assert list(sections) == ["Setup", "Methods"]
-
-
-def test_report_exists_when_every_run_failed(tmp_path):
-    sections, shown = report_of(ordinary(tmp_path, failed=range(24)))
-    assert shown.table("error", "runs")[0][1] == "24"
-    assert "Transitions" not in sections
+@pytest.mark.parametrize(
+    ("runs", "titles"), [({"missing": range(24), "parts": 1}, []), ({"failed": range(24)}, ["Summary"])]
+)
+def test_report_exists_before_any_run_has_ended_and_when_every_run_failed(tmp_path, runs, titles):
+    sections, shown = report_of(ordinary(tmp_path, **runs))
+    assert list(sections) == [*titles, "Setup", "Methods"]
+    assert "failed" not in runs or shown.table("error", "runs")[0][1] == "24"
 
 
 def test_constant_and_missing_responses_are_left_out_and_named(tmp_path):
@@ -245,12 +221,6 @@ def test_responses_that_are_listed_are_shown_even_if_constant(tmp_path):
         BadInput, check=lambda error: error.key == "ordre" and "order (did you mean this?)" in error.expected
     ):
         report_of(tmp_path / "made-up", ["ordre"])
-
-
-def test_change_point_is_found_where_the_response_jumps(tmp_path):
-    step = {"order.final": lambda point, rng: float(point["radio.loss"] < 0.3) + 0.05 * rng.standard_normal()}
-    _, shown = report_of(ordinary(tmp_path, numbers=step, times={}))
-    assert [row[1] for row in shown.table("response", "change point")] == ["0.3"]
 
 
 @pytest.mark.parametrize(
@@ -283,6 +253,7 @@ def test_line_has_no_change_point_and_a_cliff_over_loss_is_a_step(tmp_path):
     assert "step at 0.75" in fits["order.final"]
     assert "explains little" in fits["target_best.final"][-1]
     assert "`radio.loss`" in str(sections["Transitions"].parts[0])
+    assert "Survival" not in sections
 
 
 def test_labels_stand_in_figures_and_unknown_ones_are_refused(tmp_path):
@@ -293,12 +264,6 @@ def test_labels_stand_in_figures_and_unknown_ones_are_refused(tmp_path):
     assert all(one.svg != other.svg for one, other in zip(report.figures, plain.figures, strict=True))
     with pytest.raises(BadInput, check=lambda error: error.key == "radio.los" and "radio.loss" in error.expected):
         campaign_report(folder, [], {"radio.los": "x"})
-
-
-def test_scenario_name_with_markup_is_escaped_in_a_report(tmp_path):
-    _, shown = report_of(ordinary(tmp_path, name="<script>alert(1)</script> & co"))
-    assert "<script>alert(1)</script> & co" in shown.texts
-    check_alone(shown)
 
 
 def test_figures_are_files_beside_the_page_as_in_it(tmp_path):
@@ -377,9 +342,6 @@ def test_more_values_become_ranges_that_hold_every_point_once(values):
     assert (np.diff(levels.number) > 0.0).all()
 
 
-pytest.importorskip("matplotlib", reason="needs the extra [report]")
-
-
 def group(values, censored=0.0, quartiles=None):
     values = np.array(values, dtype=float)
     return GroupValues("a", values, censored, quartiles or tuple(np.quantile(values, (0.25, 0.5, 0.75))))
@@ -449,31 +411,6 @@ def test_resilience_and_scaling_are_drawn_of_a_few_points():
 )
 def test_axis_is_logarithmic_for_positive_values_over_decades(values, logarithmic):
     assert fits_log(np.array(values)) == logarithmic
-
-
-pytest.importorskip("matplotlib", reason="needs the extra [report]")
-
-
-@pytest.fixture
-def browser():
-    """Skips where there is none that starts."""
-    for name in ("chromium", "chromium-browser", "google-chrome"):
-        path = shutil.which(name)
-        if path and subprocess.run([path, "--version"], capture_output=True, timeout=60, check=False).returncode == 0:
-            return path
-    pytest.skip("needs chromium")
-
-
-def test_page_of_a_campaign_fits_a_phones_screen(tmp_path, browser):
-    vary = {"radio.loss": [0.0, 0.2, 0.4, 0.6], "robots.a-group-of-a-long-name.count": [5, 10, 20]}
-    folder = write_campaign(tmp_path / "a", vary, (1, 2, 3), failed=(1,), missing=(2,), name="A" * 90)
-    text = page(campaign_report(CampaignFolder(folder), ["order", "aggregation_time_s"]))
-    frame = tmp_path / "frame.html"
-    frame.write_text(FRAME.format(width=PHONE_PX, page=html.escape(text)), encoding="utf-8")
-    quiet = ("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars")
-    command = [browser, *quiet, f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=20000", "--dump-dom"]
-    ended = subprocess.run([*command, frame.as_uri()], capture_output=True, text=True, timeout=100, check=True)
-    assert f"is {PHONE_PX} of {PHONE_PX} px, beyond: </body>" in ended.stdout
 
 
 def test_share_curve_is_drawn_with_its_intervals():

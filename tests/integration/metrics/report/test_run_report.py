@@ -37,6 +37,7 @@ from tests.support.metrics.truths import departed, static, tally
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 page = pytest.importorskip("swarmwire.metrics.pictures.report.page").page
 TIME_S = np.arange(50) / 10
+PACE = {"factor": 1.0, "missed_ticks": 0, "worst_lag_s": 0.0, "subtick_s": None, "tick_jitter": None, "delivery": None}
 
 
 def texts(report):
@@ -52,6 +53,12 @@ def table(report, caption):
     parts = [part for section in report.sections for part in section.parts if isinstance(part, ReportTable)]
     match = next(part for part in parts if part.caption.startswith(caption))
     return {row[0]: row[1:] for row in match.rows}
+
+
+def summary_changed(folder, **changes):
+    """Change the summary of a run folder."""
+    file = folder / "summary.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), **changes}))
 
 
 def names(report):
@@ -98,6 +105,7 @@ def test_report_of_a_run_without_a_radio_says_so(tmp_path):
     report = run_report(run_folder(tmp_path, run, wandering(run, 12)))
     assert names(report) == ["timeline", "trajectories", "metrics"]
     assert "no radio" in texts(report)
+    assert "Real time" not in [section.title for section in report.sections]
 
 
 def test_report_of_several_arenas_draws_the_first_and_tabulates_all(tmp_path):
@@ -180,15 +188,9 @@ def test_events_are_listed_with_the_robots_that_they_changed(tmp_path):
 def test_stop_of_a_run_and_times_of_metrics_are_marked_in_a_report(tmp_path, monkeypatch):
     run, drawn = static(3), []
     folder = run_folder(tmp_path, run, wandering(run, 20), ended="stopped")
-    summary = json.loads((folder / "summary.json").read_text())
-    end = {
-        "ended": "stopped",
-        "ticks": 20,
-        "sim_time_s": 2.0,
-        "stop_time_s": 0.7,
-        "stopped_by": "order at least 0.1 for 1 s",
-    }
-    (folder / "summary.json").write_text(json.dumps({**summary, "stop": [end["stopped_by"]], "by_arena": [end]}))
+    condition = "order at least 0.1 for 1 s"
+    end = {"ended": "stopped", "ticks": 20, "sim_time_s": 2.0, "stop_time_s": 0.7, "stopped_by": condition}
+    summary_changed(folder, stop=[condition], by_arena=[end])
     file = folder / "ticks.parquet"
     column = pl.when(pl.col("tick") > 11).then(1.2).alias("aggregation_time_s")
     pl.read_parquet(file).with_columns(column).write_parquet(file)
@@ -208,19 +210,10 @@ def test_stop_of_a_run_and_times_of_metrics_are_marked_in_a_report(tmp_path, mon
 
 def test_lateness_of_a_real_time_run_is_reported(tmp_path):
     folder = run_folder(tmp_path, static(3), wandering(static(3), 6))
-    summary = json.loads((folder / "summary.json").read_text())
     delays = {"count": 1500, "p50_s": 0.0011, "p99_s": 0.0029, "worst_s": 0.0071}
-    pace = {
-        "factor": 1.0,
-        "missed_ticks": 2,
-        "worst_lag_s": 0.004,
-        "subtick_s": 0.001,
-        "tick_jitter": {**delays, "count": 6},
-        "delivery": None,
-    }
+    pace = {"missed_ticks": 2, "worst_lag_s": 0.004, "subtick_s": 0.001, "tick_jitter": {**delays, "count": 6}}
     frames = {"sent": 1100, "sent_bytes": 220_000, "delivered": 1500, "delivered_bytes": 300_000, "late": 15}
-    changed_summary = {**summary, "realtime": pace, "interfaces": {**frames, "delivery": delays}}
-    (folder / "summary.json").write_text(json.dumps(changed_summary))
+    summary_changed(folder, realtime=PACE | pace, interfaces={**frames, "delivery": delays})
     report = run_report(folder)
     assert table(report, "Lateness") == {
         "ticks": ("6", "1.1", "2.9", "7.1"),
@@ -234,7 +227,6 @@ def test_lateness_of_a_real_time_run_is_reported(tmp_path):
 
 def test_gaps_in_poses_from_outside_are_reported_by_robot_the_longest_first(tmp_path):
     folder = run_folder(tmp_path, static(3), wandering(static(3), 6))
-    summary = json.loads((folder / "summary.json").read_text())
     source = {
         "source": "udp 127.0.0.1:9870",
         "received": 1234,
@@ -242,9 +234,7 @@ def test_gaps_in_poses_from_outside_are_reported_by_robot_the_longest_first(tmp_
         "longest_gap_s": {"flock-0": 0.021, "flock-1": 1.5, "flock-2": 0.25},
         "silent_ticks": {"flock-1": 5},
     }
-    pace = {"factor": 1.0, "missed_ticks": 0, "worst_lag_s": 0.0, "subtick_s": None, "tick_jitter": None}
-    changed_summary = {**summary, "realtime": {**pace, "delivery": None}, "poses": [source]}
-    (folder / "summary.json").write_text(json.dumps(changed_summary))
+    summary_changed(folder, realtime=PACE, poses=[source])
     report = run_report(folder)
     gaps = table(report, "Poses from udp 127.0.0.1:9870: 1,234 were used, 99 % of them within 1.1 ms of their arrival")
     assert list(gaps.items()) == [("flock-1", ("1.5", "5")), ("flock-2", ("0.25", "0")), ("flock-0", ("0.021", "0"))]
@@ -253,33 +243,19 @@ def test_gaps_in_poses_from_outside_are_reported_by_robot_the_longest_first(tmp_
 
 def test_relayed_topics_are_reported_by_robot_and_in_all(tmp_path):
     folder = run_folder(tmp_path, static(3), wandering(static(3), 6))
-    summary = json.loads((folder / "summary.json").read_text())
     robots = {
         "flock-0": {"messages": 1200, "received": 5, "packets": 3610, "sent_bytes": 4_800_000},
         "flock-1": {"messages": 0, "received": 1100, "packets": 12, "sent_bytes": 240},
     }
-    totals = {
-        "messages": 1200,
-        "intended": 1205,
-        "received": 1105,
-        "lost": 100,
-        "packets": 3622,
-        "sent_bytes": 4_800_240,
-    }
-    topic = {"topic": "map", "reliable": True, **totals, "repeated": 10, "requests": 12, "robots": robots}
-    pace = {"factor": 1.0, "missed_ticks": 0, "worst_lag_s": 0.0, "subtick_s": None, "tick_jitter": None}
-    relayed = {**summary, "realtime": {**pace, "delivery": None}, "relay": [topic]}
-    (folder / "summary.json").write_text(json.dumps(relayed))
+    messages = {"messages": 1200, "intended": 1205, "received": 1105, "lost": 100}
+    packets = {"packets": 3622, "sent_bytes": 4_800_240, "repeated": 10, "requests": 12}
+    topic = {"topic": "map", "reliable": True, **messages, **packets, "robots": robots}
+    summary_changed(folder, realtime=PACE, relay=[topic])
     assert table(run_report(folder), "Topic map over the radio") == {
         "flock-0": ("1,200", "5", "3,610", "4,800,000"),
         "flock-1": ("0", "1,100", "12", "240"),
         "all": ("1,200", "1,105", "3,622", "4,800,240"),
     }
-
-
-def test_lockstep_run_has_no_section_on_real_time(tmp_path):
-    report = run_report(run_folder(tmp_path, static(3), wandering(static(3), 6)))
-    assert "Real time" not in [section.title for section in report.sections]
 
 
 def test_custom_metric_is_reported_by_its_recorded_facts(tmp_path):
@@ -309,9 +285,6 @@ def test_folder_without_a_run_is_refused_by_a_report(tmp_path):
     for folder, where in ((tmp_path / "none", tmp_path / "none"), (tmp_path, tmp_path / "static.json")):
         with pytest.raises(BadInput, check=lambda error, where=where: error.where == str(where)):
             run_report(folder)
-
-
-pytest.importorskip("matplotlib", reason="needs the extra [report]")
 
 
 def test_panels_share_their_time_and_hold_the_curves():
@@ -404,15 +377,8 @@ def test_trajectories_of_many_robots_stay_light(robots, most_bytes):
 
 def test_ratios_over_distance_have_their_binomial_intervals():
     received, intended = np.array([9, 5, 0]), np.array([10, 10, 4])
-    table = pl.DataFrame(
-        {
-            "from_m": [0.0, 1.0, 2.0],
-            "to_m": [1.0, 2.0, 3.0],
-            "intended": intended,
-            "received": received,
-            "pdr": received / intended,
-        }
-    )
+    counts = {"intended": intended, "received": received, "pdr": received / intended}
+    table = pl.DataFrame({"from_m": [0.0, 1.0, 2.0], "to_m": [1.0, 2.0, 3.0], **counts})
     upper, lower = delivery_by_distance(table, 2.0).axes
     np.testing.assert_array_equal(upper.lines[0].get_ydata(), received / intended)
     bars = np.array([segment[:, 1] for segment in upper.collections[0].get_segments()])

@@ -49,15 +49,6 @@ def test_crazyflie_takes_off_with_the_first_command_and_lands_when_closed(room: 
     assert flight.state is not SupervisorState.LOCKED
 
 
-def test_crazyflie_reads_ranges_flow_and_battery(room: Room, driver: CrazyflieDriver) -> None:
-    driver.act(Command(0.3))
-    until(lambda: driver.sense(driver.measures)["flow.forward_mps"][0] == pytest.approx(0.3, abs=1e-3))
-    fields = driver.sense(driver.measures)
-    assert {name.partition(".")[0] for name in fields} == {"scan", "flow", "imu", "battery"}
-    assert fields["scan.range_m"].tolist() == [[1.5, 0.4, float("inf"), 2.0]]
-    assert fields["battery.charge"][0] == pytest.approx(0.75)
-
-
 def test_stop_hovers_until_the_next_command(room: Room, driver: CrazyflieDriver) -> None:
     flight = room.gateway._robots[0].flight
     driver.act(Command(0.3))

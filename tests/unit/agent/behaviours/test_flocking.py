@@ -5,17 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.behaviours import Consensus, LennardJonesFlocking, MinimalistFlocking
 from swarmwire.agent.behaviours.consensus import Value
 from swarmwire.agent.behaviours.lennard_jones_flocking import Here
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
-from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.deploy import Simulation, run
-from tests.support.agent.hosts import group
+from tests.support.agent.behaviours import OneRobot
 
 PAPER = Path(__file__).parents[4] / "scenarios" / "papers" / "scenarios" / "vicsek.toml"
 SIDE_M, RANGE_M, WAY_M = 5.0, 1.0, 0.03
@@ -89,20 +86,20 @@ def test_vicsek_ignores_lost_packets() -> None:
 
 def consensus_value(*others: float, **params: float) -> float:
     """What a robot comes to that starts with 1 and hears these numbers in its first step."""
-    zeros = np.zeros(len(others), np.int64)
-    payloads = Payloads.from_rows([Value(value=other).encode() for other in others])
-    received = ReceivedPackets(zeros, np.arange(1, len(others) + 1), zeros, zeros, {}, np.arange(len(others)), payloads)
-    agents = agent_group(group("", [0], body="point", params={"start": 1.0, **params}), Consensus)
-    actions = agents.act((0, 0, 10**8), GroupReadings(np.zeros(1, np.int64), {}), received)
+    robot = OneRobot(Consensus, "point", **{"start": 1.0, **params})
+    actions = robot.act({}, [Value(value=other) for other in others])
     (payload,) = (actions.sent.payloads.row(row) for row in range(len(actions.sent)))
     (value,) = actions.values.value.tolist()
     assert Value.decode(payload).value == value  # what it says to others is what it tells
     return value
 
 
-@pytest.mark.parametrize(("others", "value"), [((), 1.0), ((2.0,), 1.1), ((2.0, 4.0), 1.4), ((1.0, 1.0), 1.0)])
-def test_consensus_adds_a_share_of_each_difference(others: tuple[float, ...], value: float) -> None:
-    assert consensus_value(*others, gain=0.1) == pytest.approx(value)
+@pytest.mark.parametrize(
+    ("others", "gain", "value"),
+    [((), 0.1, 1.0), ((2.0,), 0.1, 1.1), ((2.0, 4.0), 0.1, 1.4), ((1.0, 1.0), 0.1, 1.0), ((2.0,), 1.0, 2.0)],
+)
+def test_consensus_adds_a_share_of_each_difference(others: tuple[float, ...], gain: float, value: float) -> None:
+    assert consensus_value(*others, gain=gain) == pytest.approx(value)
 
 
 def test_consensus_draws_first_values_around_the_start() -> None:
@@ -128,40 +125,22 @@ def test_consensus_diverges_for_a_gain_above_two_over_the_eigenvalue() -> None:
     assert error(0.21) > 1.0
 
 
-def test_consensus_of_two_robots_with_gain_one_swaps_their_numbers() -> None:
-    assert (consensus_value(2.0, gain=1.0), consensus_value(1.0, gain=1.0, start=2.0)) == (2.0, 1.0)
-
-
 def test_consensus_average_shifts_with_one_way_losses() -> None:
     result = run(CONSENSUS_PAPER, overrides=[RING, "radio.loss=0.5"], seeds=range(1, 9))
     final = [arena.metrics["consensus_bias"].final or 0.0 for arena in result.arenas]
     assert 0.01 < np.std(final) < 0.2
 
 
-class LennardJonesRobot:
+class LennardJonesRobot(OneRobot):
     """A foot-bot; `step` gives it neighbours (range in m, bearing in degrees), and returns its left and right wheel."""
 
     def __init__(self, **params: float) -> None:
-        self._tick = 0
-        self._agents = agent_group(group("", [0], body="footbot", params=dict(params)), LennardJonesFlocking)
+        super().__init__(LennardJonesFlocking, "footbot", **params)
 
     def step(self, *neighbours: tuple[float, float], light_ray: int | None = None) -> tuple[float, float]:
-        k = len(neighbours)
-        table = np.array(neighbours, np.float64).reshape(-1, 2)
-        zeros = np.zeros(k, np.int64)
-        measured = {"range_m": table[:, 0], "bearing_rad": np.deg2rad(table[:, 1])}
-        received = ReceivedPackets(
-            zeros, np.arange(1, k + 1), zeros, zeros, measured, np.arange(k), Payloads.from_rows([Here().encode()] * k)
-        )
-        light = np.zeros((1, 24))
-        if light_ray is not None:
-            light[0, light_ray] = 0.4
-        fields = {"light.value": light}
-        actions = self._agents.act(
-            (self._tick, self._tick * 10**8, 10**8), GroupReadings(np.zeros(1, np.int64), fields), received
-        )
-        self._tick += 1
-        forward, turn = float(actions.linear_mps[0]), float(actions.angular_radps[0])
+        light = np.where(np.arange(24) == light_ray, 0.4, 0.0)
+        at = [(range_m, np.deg2rad(bearing_deg)) for range_m, bearing_deg in neighbours]
+        forward, turn = self.command({"light.value": light}, [Here()] * len(at), at)
         return forward - 0.5 * BASE_M * turn, forward + 0.5 * BASE_M * turn
 
 
@@ -239,19 +218,14 @@ def values(rays: Distances) -> np.ndarray:
     return np.where(np.isfinite(distance_m), RESPONSE.value(np.minimum(distance_m, 1.0)), 0.0)
 
 
-class OneMinimalist:
+class OneMinimalist(OneRobot):
     """A flockbot; `step` tells it what its rays see, in diameters, and returns speed and turn rate."""
 
     def __init__(self, **params: float) -> None:
-        self._tick = 0
-        self._agents = agent_group(group("", [0], body="flockbot", params=dict(params)), MinimalistFlocking)
+        super().__init__(MinimalistFlocking, "flockbot", period_ns=10**7, **params)
 
     def step(self, robots: Distances = NOTHING, walls: Distances = NOTHING) -> tuple[float, float]:
-        fields = {"infrared.value": values(robots)[None], "proximity.value": values({**walls, **robots})[None]}
-        readings = GroupReadings(np.zeros(1, np.int64), fields)
-        actions = self._agents.act((self._tick, self._tick * 10**7, 10**7), readings, ReceivedPackets.none())
-        self._tick += 1
-        return float(actions.linear_mps[0]), float(actions.angular_radps[0])
+        return self.command({"infrared.value": values(robots), "proximity.value": values({**walls, **robots})})
 
 
 def command(robots: Distances = NOTHING, walls: Distances = NOTHING, **params: float) -> tuple[float, float]:

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.agent.agent_group import agent_group
 from swarmwire.agent.behaviours import (
     Aggregation,
     BeaconAvoidance,
@@ -17,7 +16,7 @@ from swarmwire.agent.behaviours import (
     ThresholdRuleProximity,
 )
 from swarmwire.agent.behaviours.aggregation import APPROACH, REPEL, WAIT, Beacon
-from swarmwire.agent.behaviours.beacon_avoidance import SLOTS, NeighbourTable, Sightings, Traffic, forget, remember
+from swarmwire.agent.behaviours.beacon_avoidance import SLOTS, NeighbourTable, Sightings, forget, remember
 from swarmwire.agent.behaviours.beacon_avoidance import Beacon as BeaconPacket
 from swarmwire.agent.behaviours.random_walk import Present
 from swarmwire.agent.fields import Vectors
@@ -25,11 +24,8 @@ from swarmwire.agent.vector_agent import VectorAgent
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.robot.bodies.body import load_body
-from swarmwire.comms.robot.packets import Payloads, ReceivedPackets
-from swarmwire.comms.robot.tick_io import GroupReadings
 from swarmwire.deploy import run
-from tests.support.agent.behaviours import Walker
-from tests.support.agent.hosts import group
+from tests.support.agent.behaviours import OneRobot, Walker
 
 MANY = 4000
 NEAR, FAR = (0.1, 0.4), (0.8, 0.4)
@@ -155,34 +151,21 @@ def test_aggregation_repels_after_leaving_then_approaches_again():
     assert np.mean(many.memory.phase == APPROACH) == pytest.approx(1.0 - np.exp(-0.2), abs=0.03)
 
 
-class BeaconRobot:
+class BeaconRobot(OneRobot):
     """One e-puck whose tests say what it hears: (range_m, bearing_rad, heading_rad, speed_mps) of neighbours."""
 
     def __init__(self, heading_rad: float = 0.0, **params: float) -> None:
-        self.tick, self.heading_rad = 0, heading_rad
-        self._agents = agent_group(group("", [0], params=dict(params)), BeaconAvoidance)
+        super().__init__(BeaconAvoidance, "epuck", **params)
+        self.heading_rad = heading_rad
 
     def step(self, *beacons: tuple[float, float, float, float], late_ns: int = 0) -> tuple[float, float]:
         """Forward speed and turn rate; packets were received `late_ns` before the step."""
-        table = np.array(beacons, np.float64).reshape(-1, 4)
-        k, now_ns = len(table), self.tick * PERIOD_NS
-        payloads = Payloads.from_rows(
-            [BeaconPacket(heading_rad=h, speed_mps=v).encode() for _, _, h, v in table.tolist()]
-        )
-        zeros, measured = np.zeros(k, np.int64), {"range_m": table[:, 0], "bearing_rad": table[:, 1]}
-        at_ns, order = np.full(k, now_ns - late_ns), np.full(k, self.tick)
-        received = ReceivedPackets(zeros, np.arange(1, k + 1), order, at_ns, measured, np.arange(k), payloads)
-        readings = GroupReadings(np.zeros(1, np.int64), {"compass.heading_rad": np.array([self.heading_rad])})
-        actions = self._agents.act((self.tick, now_ns, PERIOD_NS), readings, received)
-        self.tick += 1
-        return float(actions.linear_mps[0]), float(actions.angular_radps[0])
+        messages = [BeaconPacket(heading_rad=float(h), speed_mps=v) for _, _, h, v in beacons]
+        at = [(range_m, bearing_rad) for range_m, bearing_rad, _, _ in beacons]
+        return self.command({"compass.heading_rad": self.heading_rad}, messages, at, late_ns)
 
     def steps(self, count: int) -> tuple[float, float]:
         return [self.step() for _ in range(count)][-1]
-
-    @property
-    def memory(self) -> Traffic:
-        return self._agents._memory
 
     def position(self) -> tuple[float, float]:
         return float(self.memory.x_m[0, 0]), float(self.memory.y_m[0, 0])
@@ -265,19 +248,15 @@ def test_neighbour_table_keeps_the_newest_packet_of_a_sender() -> None:
     assert table.age_s.tolist() == [[np.inf] * SLOTS]
 
 
-class Alone:
+class Alone(OneRobot):
     """One robot whose tests say what its rays see."""
 
     def __init__(self, kind: type[VectorAgent], **params: float) -> None:
-        self.body = "turtlebot3-burger" if "scan" in kind.needs else "footbot"
-        self._tick, self._agents = 0, agent_group(group("", [0], body=self.body, params=dict(params)), kind)
+        super().__init__(kind, "turtlebot3-burger" if "scan" in kind.needs else "footbot", **params)
 
-    def step(self, **readings: FloatArray) -> tuple[float, float]:
-        fields = {name.replace("_", ".", 1): reading[None, :] for name, reading in readings.items()}
-        at = GroupReadings(np.zeros(1, np.int64), fields)
-        actions = self._agents.act((self._tick, self._tick * 10**8, 10**8), at, ReceivedPackets.none(()))
-        self._tick += 1
-        return float(actions.linear_mps[0]), float(actions.angular_radps[0])
+    def step(self, rays: FloatArray) -> tuple[float, float]:
+        """Its command at these answers of its proximity rays."""
+        return self.command({"proximity.value": rays})
 
     def sees(self, *things: tuple[float, float], wide_deg: float = 0.5) -> tuple[float, float]:
         """Its command where the scanner sees things, each at (angle_deg, range_m), so wide to either side."""
@@ -286,7 +265,7 @@ class Alone:
             assert BURGER.scan is not None
             off = np.rad2deg(np.angle(np.exp(1j * (BURGER.scan.angle_rad - np.deg2rad(angle_deg)))))
             range_m[np.abs(off) <= wide_deg] = far_m
-        return self.step(scan_range_m=range_m)
+        return self.command({"scan.range_m": range_m})
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 90.0, 180.0, -90.0])
@@ -311,9 +290,9 @@ def rays(*distances: tuple[int, float]) -> FloatArray:
 @pytest.mark.parametrize("ray", [0, 7, 12, 23])
 def test_threshold_of_proximity_rays_is_from_the_rim(ray: int) -> None:
     robot = Alone(ThresholdRuleProximity, safe_m=0.05)
-    assert robot.step(proximity_value=rays()) == (0.1, 0.0), "rays that see nothing are not at their reach"
-    assert robot.step(proximity_value=rays((ray, 0.045))) == (-0.05, 0.5)
-    assert robot.step(proximity_value=rays((ray, 0.055))) == (0.1, 0.0)
+    assert robot.step(rays()) == (0.1, 0.0), "rays that see nothing are not at their reach"
+    assert robot.step(rays((ray, 0.045))) == (-0.05, 0.5)
+    assert robot.step(rays((ray, 0.055))) == (0.1, 0.0)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -322,7 +301,7 @@ def test_smoothed_avoidance_turns_away_and_never_drives_backwards(side: float) -
     ray = 1 if side > 0.0 else 22  # at 22.5 degrees
     for _ in range(20):
         by_scanner = scanner.sees((side * 30.0, 0.3), wide_deg=20.0)
-        by_rays = short.step(proximity_value=rays((ray, 0.02)))
+        by_rays = short.step(rays((ray, 0.02)))
         for linear, angular in (by_scanner, by_rays):
             assert linear >= 0.0
             assert np.sign(angular) == -side
