@@ -273,13 +273,6 @@ def test_lockstep_has_one_answer_per_tick(steps: list[int]) -> None:
             protocol.answer(ACTIONS)
 
 
-@given(st.lists(st.binary(max_size=40) | st.binary(min_size=1, max_size=3).map(lambda tail: tick(1)[:-4] + tail)))
-def test_malformed_frames_are_counted(garbage: list[bytes]) -> None:
-    protocol = playing(*garbage)
-    assert protocol.next_event() is None
-    assert protocol.dropped == len(garbage)
-
-
 CALLS: dict[Move, Callable[[RunnerProtocol], object]] = {
     "joins": lambda protocol: protocol.receive_assignment(msgpack.packb(REPLY)),
     "is ready": RunnerProtocol.ready,

@@ -1,6 +1,5 @@
 """Metrics as they are measured in a run, and the conditions on them that end arenas."""
 
-import json
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -14,9 +13,9 @@ from swarmwire.comms.base.clock import tick_start_ns, to_ns, to_s
 from swarmwire.comms.base.config import parameter
 from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.measures.measure import Condition, MeasuredStopConditions, Metrics
-from swarmwire.metrics.measures.metric import Components, Metric, Sampled, TickView, agreement
+from swarmwire.metrics.measures.metric import Metric, Sampled
 from swarmwire.metrics.measures.swarm.order import Order
-from tests.support.metrics.truths import edges, in_each_tick, poses, static, truth, watch
+from tests.support.metrics.truths import in_each_tick, poses, static, truth, watch
 
 
 @dataclass(frozen=True)
@@ -55,14 +54,6 @@ def test_count_ends_with_its_total_and_statistics_of_its_increments():
     assert second["wall_contacts"] == {"final": 4.0, "mean": pytest.approx(4 / 3), "min": 0.0, "max": 2.0}
 
 
-def test_latest_is_the_value_of_a_level_and_the_total_of_a_count():
-    run, metrics = static(2), Metrics()
-    ticks = ({"pose": poses([0.0, turn]), "contact_onsets": np.array([[1, 0]])} for turn in (np.pi, 0.0))
-    summaries(metrics, run, *ticks)
-    assert metrics.latest["order"].tolist() == [1.0]
-    assert metrics.latest["collisions"].tolist() == [2.0]
-
-
 def test_ticks_without_a_value_are_left_out_and_what_never_had_one_is_null():
     run = static(2, radio=False)
     dead = {"alive": np.zeros(2, np.bool_)}
@@ -74,12 +65,6 @@ def test_ticks_without_a_value_are_left_out_and_what_never_had_one_is_null():
 def test_metrics_of_a_run_without_a_tick_are_null():
     [summary] = summaries(Metrics(["order"]), static())
     assert summary["order"] == dict.fromkeys(("final", "mean", "min", "max"))
-
-
-def test_metrics_summary_is_plain_json():
-    run = static(3, arenas=2)
-    summary = summaries(Metrics(), run, {"edges": edges((0, 1))})
-    assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 
 def test_metric_with_parameters_is_passed_as_an_object():
@@ -95,43 +80,6 @@ def test_metric_with_parameters_is_passed_as_an_object():
 def test_unknown_and_duplicate_metric_names_are_refused(names, hint):
     with pytest.raises(BadInput, check=lambda error: error.key == "metrics" and hint in error.expected):
         Metrics(names)
-
-
-def test_rows_are_folded_by_arena():
-    run = static(3, arenas=2)
-    pose, velocity = np.arange(36.0).reshape(2, 6, 3)
-    alive = np.array([True, True, False, True, False, False])
-    view = TickView(run, truth(run, pose=pose, velocity=velocity, alive=alive))
-    assert (view.position_m[1, 2] == pose[5, :2]).all()
-    assert (view.velocity[1, 2, :2] == velocity[5, :2]).all()
-    assert view.heading_rad[0, 1] == pose[1, 2]
-    assert view.robots_alive.tolist() == view.sum_alive(np.ones((2, 3))).tolist() == [2, 1]
-    assert view.components is None
-
-
-def test_components_are_those_of_the_robots_alive():
-    run = static(3, arenas=2)
-    alive = np.array([True, True, True, True, True, False])
-    components = TickView(run, truth(run, alive=alive, edges=edges((0, 1), (1, 2), (4, 5)))).components
-    assert isinstance(components, Components)
-    assert components.number.tolist() == [1, 2]
-    assert components.largest.tolist() == [3, 1]
-
-
-def test_vectors_agree_by_how_near_their_sum_comes_to_the_most():
-    x = np.array([[3.0, 3.0, 9.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
-    y = np.array([[4.0, 4.0, 9.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    alive = np.array([[1, 1, 0], [1, 1, 1], [0, 0, 0], [1, 1, 1]], np.bool_)
-    assert agreement(x, y, alive, True)[[0, 1, 3]].tolist() == [1.0, pytest.approx(1 / 3), 0.0]
-    assert agreement(x / 5, y / 5, alive, False)[[0, 1]].tolist() == [pytest.approx(1.0), pytest.approx(1 / 15)]
-    assert np.isnan(agreement(x, y, alive, True)[2])
-
-
-def test_directions_are_the_cosines_and_sines_of_headings():
-    run = static(3, arenas=2)
-    view = TickView(run, truth(run, pose=poses([0.3, -2.0, 9.0, 0.0, 3.1, -0.1])))
-    np.testing.assert_allclose(view.direction[0], np.cos(view.heading_rad))
-    np.testing.assert_allclose(view.direction[1], np.sin(view.heading_rad))
 
 
 @dataclass(frozen=True)
@@ -232,35 +180,9 @@ def script(comparison="at_least", limit=1.0, hold_s=0.0):
     return Condition("script", comparison, limit, hold_s)
 
 
-@pytest.mark.parametrize(
-    ("series", "condition", "stop"),
-    [
-        ([0, 0.5, 1, 0, 1], script(), (0.2, 2)),
-        ([1, 0, 0, 1], script(), (0.0, 0)),
-        ([1, 0, 1, 1, 1, 1], script(hold_s=0.3), (0.2, 5)),
-        ([0, 1, 1, 1], script(hold_s=0.3), None),
-        ([1, 1, NONE, 1, 1, 1], script(hold_s=0.2), (pytest.approx(0.3), 5)),
-        ([NONE] * 3, script("below", 5.0), None),
-        ([1.0], script("at_most"), (0.0, 0)),
-        ([1.0], script("above"), None),
-        ([1.0], script("below"), None),
-    ],
-)
-def test_stop_time_is_the_start_of_the_first_stretch_that_held(series, condition, stop):
-    stop_time_s, over = stop or (None, None)
-    assert one(series, condition) == (stop_time_s, str(condition) if stop else None, over)
-
-
 def test_condition_is_written_in_words():
     assert str(script()) == "script at least 1"
     assert str(script("above", 0.0, 0.2)) == "script above 0 for 0.2 s"
-
-
-def test_stop_conditions_end_by_any_and_name_the_first():
-    first, second = script("at_least", 2.0), script("above", 0.0, 0.2)
-    assert one([0, 2, 2], first, second)[:2] == (0.1, str(first))
-    assert one([1, 1, 2], first, second)[:2] == (0.2, str(first))
-    assert one([1, 1, 1], first, second)[:2] == (0.0, str(second))
 
 
 def test_condition_that_keeps_the_arena_running_only_notes_its_time():

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Group
 from swarmwire.comms.robot.bodies.body import load_body
@@ -19,6 +18,7 @@ from swarmwire.metrics.pictures.drawing.scenario import _facts
 from swarmwire.metrics.pictures.drawing.swarm import in_range
 from tests.support.comms.lines import indexed, is_blocked_on_floor
 from tests.support.metrics.films import LIGHT, OBSTACLES, film, two_groups
+from tests.support.refusals import refused_input
 
 pytest.importorskip("matplotlib", reason="needs the extra [report]")
 SIZE_PX = 640
@@ -188,13 +188,13 @@ def test_custom_metric_is_plotted_by_its_numbers_alone():
     [(10, None, "--size", ""), (300, ["ordr"], "--metric", "ordr"), (300, ["order"] * 5, "--metric", "")],
 )
 def test_film_options_that_cannot_be_drawn_are_refused(size, metrics, where, key):
-    with pytest.raises(BadInput, check=lambda error: (error.where, error.key) == (where, key)):
+    with refused_input(where, key):
         FilmFigure(film(), size, metrics)
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "absent/a.png", "."])
 def test_path_that_cannot_be_written_is_refused_for_a_picture(tmp_path, name):
-    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / name)):
+    with refused_input(tmp_path / name):
         FilmFigure(film(), 300).save(0, tmp_path / name)
     assert not any(tmp_path.iterdir())
 

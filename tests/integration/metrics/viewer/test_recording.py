@@ -24,6 +24,7 @@ from swarmwire.metrics.records.run_folder.verify import check_recording
 from tests.support.clocks import StillClock
 from tests.support.metrics.recordings import class_names, column, moving, record, series
 from tests.support.metrics.truths import edges, static, tally, truth, watch
+from tests.support.refusals import refused_input
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
 
@@ -453,12 +454,12 @@ def test_picture_without_a_graphics_driver_is_refused_with_the_remedy(rrd, monke
 
 @pytest.mark.parametrize("tick", [-1, 20])
 def test_picture_at_a_time_that_was_not_recorded_is_refused(rrd, tick):
-    with pytest.raises(BadInput, check=lambda error: error.where == "--at" and "recorded" in error.expected):
+    with refused_input("--at", match="recorded"):
         picture(rrd, "none.png", tick / static(3).rate_hz)
 
 
 def test_picture_of_a_missing_recording_is_refused(tmp_path):
-    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "none.rrd")):
+    with refused_input(tmp_path / "none.rrd"):
         render_png(tmp_path / "none.rrd", tmp_path / "none.png")
 
 

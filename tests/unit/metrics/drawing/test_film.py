@@ -6,9 +6,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.metrics.pictures.drawing.film import MAX_BY_DEFAULT, NO_STATE, film_of, footage, states
 from tests.support.metrics.films import Folder, film, ticks_frame, two_groups
+from tests.support.refusals import refused_input
 
 
 def test_film_holds_what_the_run_folder_does(tmp_path):
@@ -37,13 +37,13 @@ def test_film_is_of_one_arena(tmp_path):
     both.write_parquet(tmp_path / "ticks.parquet")
     folder = Folder(tmp_path, two_groups(arenas=2))
     np.testing.assert_array_equal(film_of(folder, 1, "run").pose, moved.pose)
-    with pytest.raises(BadInput, check=lambda error: (error.where, error.key) == ("run", "arena")):
+    with refused_input("run", "arena"):
         film_of(folder, 2, "run")
 
 
 def test_run_without_a_tick_makes_no_film():
     empty = SimpleNamespace(static=two_groups(), measured={}, ticks=lambda _: ticks_frame(film())[:0])
-    with pytest.raises(BadInput, check=lambda error: error.where == "run"):
+    with refused_input("run"):
         film_of(empty, 0, "run")
 
 
@@ -130,5 +130,5 @@ def test_single_tick_is_a_film_of_one_frame():
     ],
 )
 def test_options_that_cut_no_film_are_refused(options, option, number):
-    with pytest.raises(BadInput, check=lambda error: error.where == option and number in error.expected):
+    with refused_input(option, match=number):
         cut(frames_per_s=10.0, **options) if "speed" in options else cut(**options)

@@ -26,6 +26,7 @@ from swarmwire.metrics.records.run_folder.tables import TABLES, read_static, wri
 from swarmwire.metrics.records.run_folder.verify import verify
 from tests.support.metrics.recorded import links, made_up_summary, record, wandering
 from tests.support.metrics.truths import static
+from tests.support.refusals import refused_input
 
 TICKS = 11
 
@@ -144,7 +145,7 @@ def test_summary_is_none_until_the_run_has_ended_and_refused_if_damaged(tmp_path
     less = [{key: value for key, value in summary.items() if key != left_out} for left_out in SUMMARY_KINDS]
     for wrong in ("{", "[]", *map(json.dumps, [*({**summary, **change} for change in changed), *less])):
         (tmp_path / "summary.json").write_text(wrong)
-        with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "summary.json")):
+        with refused_input(tmp_path / "summary.json"):
             _ = folder.summary
 
 
@@ -162,11 +163,11 @@ def test_parts_that_are_joined_while_they_are_read_do_no_harm(recorded, monkeypa
 
 
 def test_missing_folder_table_and_static_part_are_named(tmp_path):
-    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "nowhere")):
+    with refused_input(tmp_path / "nowhere"):
         RunFolder(tmp_path / "nowhere")
-    with pytest.raises(BadInput, check=lambda error: error.key == "packets"):
+    with refused_input(key="packets"):
         RunFolder(tmp_path).packets()
-    with pytest.raises(BadInput, check=lambda error: error.where == str(tmp_path / "static.json")):
+    with refused_input(tmp_path / "static.json"):
         _ = RunFolder(tmp_path).static
 
 
@@ -183,11 +184,11 @@ def test_events_and_packets_of_a_killed_run_without_any_are_empty(tmp_path):
 
 def test_damaged_table_and_unknown_arena_are_named(recorded):
     folder, _, _ = recorded
-    with pytest.raises(BadInput, check=lambda error: error.key == "arena"):
+    with refused_input(key="arena"):
         folder.robots(2)
     for file in folder.files("ticks"):
         file.write_bytes(file.read_bytes()[:-9])
-    with pytest.raises(BadInput, check=lambda error: error.where == folder.where("ticks")):
+    with refused_input(folder.where("ticks")):
         folder.ticks()
 
 
@@ -270,7 +271,7 @@ def test_damaged_static_part_is_refused_with_its_fault(tmp_path, change, fault):
     path = tmp_path / "static.json"
     write_static(static(2), path)
     path.write_text(json.dumps({**json.loads(path.read_text()), **change}))
-    with pytest.raises(BadInput, check=lambda error: error.where == str(path) and fault in error.expected):
+    with refused_input(path, match=fault):
         read_static(path)
 
 
@@ -279,7 +280,7 @@ def test_static_file_without_a_json_object_is_refused(tmp_path, text):
     path = tmp_path / "static.json"
     if text is not None:
         path.write_text(text)
-    with pytest.raises(BadInput, check=lambda error: error.where == str(path)):
+    with refused_input(path):
         read_static(path)
 
 
@@ -339,9 +340,8 @@ def test_rows_beyond_those_of_the_run_are_refused_unread(tmp_path, name, most):
     multiply(folder, name, most)
     assert len(folder.table(name)) == most
     multiply(folder, name, most + 1)
-    with pytest.raises(BadInput) as refused:
+    with refused_input(tmp_path / f"{name}.parquet"):
         folder.table(name)
-    assert refused.value.where == str(tmp_path / f"{name}.parquet")
     (finding,) = (row for row in verify(tmp_path) if row.part == name)
     assert finding.state is TableState.DAMAGED
     assert f"{most + 1} rows" in finding.text

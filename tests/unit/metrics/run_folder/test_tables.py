@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.truth import EventRecord
 from swarmwire.comms.robot.packets import Fate, Payloads
 from swarmwire.metrics.measures.measure import Metrics
@@ -24,6 +23,7 @@ from swarmwire.metrics.records.run_folder.writer import parts_of
 from tests.support.clocks import StillClock
 from tests.support.metrics.recorded import links, record, wandering
 from tests.support.metrics.truths import edges, static, tally, truth
+from tests.support.refusals import refused_input
 
 FIELDS = {
     "pose": ("x_m", "y_m", "heading_rad"),
@@ -110,7 +110,7 @@ def test_metric_named_like_a_column_is_refused(tmp_path):
         name = "received"
 
     metrics = Metrics([ReceivedPackets()])
-    with pytest.raises(BadInput, check=lambda error: error.key == "metrics.received"):
+    with refused_input(key="metrics.received"):
         TickRecorder(tmp_path, metrics, StillClock()).begin(static(2))
 
 
@@ -202,7 +202,7 @@ def test_packet_sample_of_a_larger_share_contains_the_smaller():
 
 @pytest.mark.parametrize("share", [0.0, -0.1, 1.1, float("nan")])
 def test_packet_share_that_is_invalid_is_refused(tmp_path, share):
-    with pytest.raises(BadInput, check=lambda error: error.key == "packets"):
+    with refused_input(key="packets"):
         PacketRecorder(tmp_path, StillClock(), share)
 
 

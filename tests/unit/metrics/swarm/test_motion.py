@@ -41,14 +41,6 @@ def test_path_efficiency_of_line_return_and_half_circle_is_known():
     assert efficiency(half[:, None]) == [pytest.approx(2.0 / np.pi, rel=1e-4)]
 
 
-def test_path_efficiency_leaves_out_robots_that_did_not_move():
-    position = np.zeros((3, 2, 2))
-    position[:, 0, 0] = 0.0, 0.1, 0.2
-    position[:, 1, 0] = 0.0, 0.001, 0.0
-    assert efficiency(position) == [pytest.approx(1.0)]
-    assert np.isnan(efficiency(position[:, 1:])).all()
-
-
 def test_path_efficiency_of_a_random_walk_has_the_known_mean():
     """sqrt(pi / (4 n)) of n steps, as the order of n headings at random; its variance is below 0.22 / n.
 
@@ -107,12 +99,6 @@ def test_changes_of_side_beyond_the_dead_band_count(turn_radps, dead_band_radps,
     assert rates == [pytest.approx(changes_per_tick * PER_MIN)]
 
 
-def test_dead_robots_neither_count_nor_remember_in_oscillation():
-    alive = np.array([[True, True], [True, False], [True, True]])
-    assert oscillation([[0, 1], [0, -1], [0, -1]], alive=alive) == [0.0]
-    assert np.isnan(oscillation([[1.0], [-1.0]], alive=np.zeros((2, 1), np.bool_))).all()
-
-
 @given(st.integers(0, 1000), st.integers(1, 25))
 def test_oscillation_is_that_of_the_definition(seed, ticks):
     rng = np.random.default_rng(seed)
@@ -164,12 +150,6 @@ def test_local_order_is_that_of_the_formula(swarm, range_m):
             means.append(np.mean([np.cos(pose[i, 2] - pose[j, 2]) for j in others]) if others else 1.0)
         values.append(np.mean(means) if means else np.nan)
     assert measure(OrderLocal(range_m=range_m), swarm) == pytest.approx(values, abs=1e-12, nan_ok=True)
-
-
-def test_groups_that_agree_each_within_itself_are_ordered_however_they_differ():
-    groups = stand((0, 0, 0), (0.1, 0, 0), (3, 0, np.pi), (3.1, 0, np.pi))
-    assert measure("order_local", groups) == [pytest.approx(1.0)]
-    assert measure("order", groups) == [pytest.approx(0.0, abs=1e-15)]
 
 
 def test_headings_at_random_have_no_local_order():

@@ -124,17 +124,6 @@ SPANS = (0.0, 0.1), (0.05, 0.3), (0.1, 0.4), (1.0, 1.05)  # the first and third 
 places = st.tuples(st.floats(-4, 4), st.floats(-3, 3), st.sampled_from([0.035, 0.085, 0.2]), st.sampled_from(SPANS))
 
 
-def gap(*at, arenas=1, **fields):
-    run = static(len(at) // arenas, arenas=arenas)
-    pose = np.zeros((len(at), 3))
-    pose[:, :2] = at
-    return measured("min_gap", run, truth(run, pose=pose, **fields))
-
-
-def test_gap_is_from_surface_to_surface():
-    assert gap((0, 0), (3, 4), (0.3, 0.4)) == [pytest.approx(0.5 - 0.07)]
-
-
 @given(st.lists(places, min_size=2, max_size=20))
 @example([(0.0, 0.0, 0.1, (0.0, 1.0)), (0.5, 0.0, 0.05, (0.0, 1.0)), (1.0, 0.0, 0.8, (0.0, 1.0))])  # far, but large
 def test_smallest_gap_of_different_bodies_is_that_of_all_pairs(robots):

@@ -97,13 +97,6 @@ def test_dead_robots_find_nothing_and_finds_outlast_deaths():
     assert values == [[pytest.approx(np.nan, nan_ok=True)], [0.1], [0.1]]
 
 
-def test_find_distance_is_a_parameter():
-    assert find_times([[0.9, 0], [1.0, 0]], within_m=1.0, lights=LIGHTS_OF_ARENAS[:1])[0] == [
-        [pytest.approx(np.nan, nan_ok=True)],
-        [0.1],
-    ]
-
-
 def test_find_share_needs_that_many_living_robots_at_once():
     x_m = [[2, 0, 0, 0, 0], [0, 2, 2, 0, 0], [2, 2, 2, 0, 0]]
     ticks = [find_times(x_m, lights=LIGHTS_OF_ARENAS[:1], share=share, robots=5)[0] for share in (0.2, 0.4, 0.6)]
