@@ -1,5 +1,3 @@
-"""The agent host, and a process for each robot."""
-
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence

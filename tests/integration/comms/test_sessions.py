@@ -1,5 +1,3 @@
-"""zenoh sessions."""
-
 import socket
 import stat
 import subprocess
@@ -83,11 +81,8 @@ def test_peers_that_list_one_another_are_linked_and_others_are_not():
     with peers(2) as (a, b):
         until(lambda: len(list(a.info.peers_zid())) == 1)
         until(lambda: [str(zid) for zid in b.info.peers_zid()] == [str(a.zid())])
-        alone = open_swarm(Network(listen=ANY_PORT))
-        try:
+        with closed_after(open_swarm(Network(listen=ANY_PORT))) as alone:
             assert not list(alone.info.peers_zid())
-        finally:
-            close_session(alone)
 
 
 def test_swarm_session_opens_without_waiting_for_absent_peers():
@@ -110,12 +105,9 @@ def test_endpoint_with_a_chosen_port_can_be_read_back():
 
 
 def test_swarm_session_without_listen_listens_nowhere():
-    session = open_swarm(Network(connect=(NOBODY,)))
-    try:
+    with closed_after(open_swarm(Network(connect=(NOBODY,)))) as session:
         assert swarm_config(Network(connect=(NOBODY,)))["listen"]["endpoints"] == []
         assert not list(session.info.peers_zid())
-    finally:
-        close_session(session)
 
 
 def test_multicast_session_listens_at_a_port_that_can_be_read_back():

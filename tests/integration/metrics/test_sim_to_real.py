@@ -1,5 +1,3 @@
-"""Sim-to-real comparison."""
-
 from dataclasses import replace
 
 import numpy as np

@@ -15,7 +15,7 @@ from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPack
 from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import open_swarm
-from swarmwire.comms.wire.sessions import close_session
+from swarmwire.comms.wire.sessions import close_session, closed_after
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, EmulatedTracker, RadioBridge
 from tests.support.clocks import FakeClock, until
 from tests.support.metrics.truths import static
@@ -200,13 +200,9 @@ def test_robot_that_does_not_fit_the_world_is_refused(robot, robots, medium, mes
 
 
 def test_missing_world_is_reported_after_a_timeout():
-    session = open_swarm(Network(listen=ANY_PORT))
     clock = DatedClock()
-    try:
-        with refused_input(match="flock-1"):
-            WorldRadio(session, KEYS, ROBOTS, "flock-1", clock, wall=clock).open()
-    finally:
-        close_session(session)
+    with closed_after(open_swarm(Network(listen=ANY_PORT))) as session, refused_input(match="flock-1"):
+        WorldRadio(session, KEYS, ROBOTS, "flock-1", clock, wall=clock).open()
     assert clock.slept_until[-1] - clock.slept_until[0] > 5 * NS_PER_S
 
 

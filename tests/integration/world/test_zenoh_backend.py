@@ -1,5 +1,3 @@
-"""The backend of runners in a network."""
-
 import itertools
 import os
 import queue

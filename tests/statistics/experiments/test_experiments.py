@@ -1,5 +1,3 @@
-"""The experiments."""
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,5 +1,3 @@
-"""The numbers of the experiment on middleware."""
-
 import polars as pl
 
 from docs.experiments.experiment import LAYOUT, find_experiment

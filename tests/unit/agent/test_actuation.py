@@ -1,5 +1,3 @@
-"""Actuators and fields of agents."""
-
 from dataclasses import replace
 from typing import Any
 

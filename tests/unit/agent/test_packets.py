@@ -1,5 +1,3 @@
-"""Packets of agents: written, sent, received."""
-
 from typing import ClassVar
 
 import numpy as np

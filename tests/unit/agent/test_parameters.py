@@ -1,5 +1,3 @@
-"""Parameters and memory of agents."""
-
 import hashlib
 from pathlib import Path
 from typing import Any

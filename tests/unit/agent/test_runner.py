@@ -1,5 +1,3 @@
-"""A runner, and its command."""
-
 import argparse
 import os
 import signal

@@ -15,6 +15,7 @@ from swarmwire.agent.on_robot.assembly import NetworkParts
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, STATUS, ask_all, endpoints_of, open_swarm
+from swarmwire.comms.wire.sessions import closed_after
 from swarmwire.metrics.real.real_log.real_logs import read_real_logs
 from tests.support.agent.on_robot.installed import DRIVING, Command, deeds, install, robot_flags
 from tests.support.agent.on_robot.scripted import PLAYERS
@@ -110,8 +111,7 @@ def test_heartbeats_continue_until_the_agent_is_closed(tmp_path, monkeypatch):
 
 def test_operator_reads_the_status_and_stops_the_robot(environment, file):
     network = Network(listen=("tcp/127.0.0.1:0",))
-    session = open_swarm(network)
-    try:
+    with closed_after(open_swarm(network)) as session:
         endpoint = endpoints_of(session, network)[0]
         radio = (*PATIENT, "--radio", "zenoh", "--connect", endpoint, "--swarm", "lab")
         with Command(environment, "run", DRIVING, *robot_flags(file, *radio)) as command:
@@ -129,8 +129,6 @@ def test_operator_reads_the_status_and_stops_the_robot(environment, file):
             assert {deed for _, deed in deeds(file)[done + 1 :]} == {"stop"}
             command.process.send_signal(signal.SIGINT)
             assert command.wait()[0] == 130
-    finally:
-        session.close()
 
 
 def test_stop_motors_makes_the_driving_agent_stop_the_robot(environment, file):

@@ -14,6 +14,7 @@ from swarmwire.agent.on_robot.guard import CLOSED, ENDED, FAILED, FORWARDED_SIGN
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, ask_all, endpoints_of, open_swarm
+from swarmwire.comms.wire.sessions import closed_after
 from tests.support.agent.on_robot.installed import Command, deeds, install
 from tests.support.agent.on_robot.scripted import PLAYERS
 from tests.support.clocks import until
@@ -121,8 +122,7 @@ def test_motors_stop_when_all_processes_are_terminated_at_once(tmp_path, robots)
 
 def test_death_after_an_emergency_stop_is_no_failure(tmp_path, robots):
     network = Network(listen=("tcp/127.0.0.1:0",))
-    session = open_swarm(network)
-    try:
+    with closed_after(open_swarm(network)) as session:
         endpoint = endpoints_of(session, network)[0]
         robots.append(robot := Robot(tmp_path, "Driving", "--radio", "zenoh", "--connect", endpoint, watchdog_s=0.5))
         assert ask_all(session, SwarmKeys("swarm"), ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
@@ -131,8 +131,6 @@ def test_death_after_an_emergency_stop_is_no_failure(tmp_path, robots):
         os.kill(robot.agent, signal.SIGKILL)
         assert robot.command.wait()[0] == 0
         assert robot.last() == ["open", "stop", "close"]
-    finally:
-        session.close()
 
 
 @pytest.fixture(autouse=True)
@@ -163,33 +161,40 @@ def test_agent_that_closed_needs_no_stop(tmp_path, code):
     assert guarded(tmp_path, f"tell({RUNS!r}); tell({CLOSED!r}); sys.exit({code})") == (code, "")
 
 
-def test_exit_without_a_closed_message_is_a_death(tmp_path, capfd):
-    assert guarded(tmp_path, f"tell({RUNS!r}); sys.exit(0)") == (FAILED, "stopped")
-    report = "guard: the agent is gone: its process ended (exit code 0); the motors were stopped\n"
-    assert capfd.readouterr().err == report
+DEATHS = {
+    "exit without a closed message": (
+        f"tell({RUNS!r}); sys.exit(0)",
+        "its process ended (exit code 0); the motors were",
+    ),
+    "no heartbeats": (f"tell({RUNS!r}); {FREEZE}", "no heartbeat for 0.2 s; the motors were"),
+    # The child holds the pipe, and maybe the only connection of the robot.
+    "child of a closed agent": (
+        f"tell({RUNS!r})\ntell({CLOSED!r})\nif os.fork() == 0: signal.pause()",
+        "it closed 0.2 s ago, and its processes did not end; the motors were",
+    ),
+    "ignored signals": (
+        f"signal.signal(signal.SIGTERM, signal.SIG_IGN)\ntell({RUNS!r})\nos.kill(os.getppid(), signal.SIGTERM)\n"
+        "while True: signal.pause()",
+        "its process ended (SIGKILL); the motors were",
+    ),
+}
 
 
-def test_agent_without_heartbeats_is_ended(tmp_path, capfd):
-    assert guarded(tmp_path, f"tell({RUNS!r}); {FREEZE}", silent_s=SHORT_S) == (FAILED, "stopped")
-    assert "no heartbeat for 0.2 s; the motors were stopped" in capfd.readouterr().err
+@pytest.mark.parametrize("death", DEATHS)
+def test_agent_that_dies_or_hangs_is_ended_and_its_motors_stopped(tmp_path, monkeypatch, capfd, death):
+    for patience in ("CLOSE_TIMEOUT_S", "GRACE_S"):
+        monkeypatch.setattr(guard_module, patience, SHORT_S)
+    agent, report = DEATHS[death]
+    assert guarded(tmp_path, agent, silent_s=SHORT_S if death == "no heartbeats" else LONG_S) == (FAILED, "stopped")
+    assert capfd.readouterr().err == f"guard: the agent is gone: {report} stopped\n"
 
 
-def test_child_of_a_closed_agent_is_ended(tmp_path, monkeypatch, capfd):
-    """The child holds the pipe, and maybe the only connection of the robot."""
-    monkeypatch.setattr(guard_module, "CLOSE_TIMEOUT_S", SHORT_S)
-    agent = f"tell({RUNS!r})\ntell({CLOSED!r})\nif os.fork() == 0:\n    signal.pause()\n"
-    assert guarded(tmp_path, agent) == (FAILED, "stopped")
-    assert "it closed 0.2 s ago, and its processes did not end" in capfd.readouterr().err
-
-
-def test_second_stop_runs_if_the_standby_fails(tmp_path, capfd):
-    assert guarded(tmp_path, f"tell({RUNS!r})", BROKEN) == (FAILED, "stopped anew")
-    assert "the motors were stopped" in capfd.readouterr().err
-
-
-def test_motors_that_cannot_be_stopped_are_reported(tmp_path, capfd):
-    assert guarded(tmp_path, f"tell({RUNS!r})", HOPELESS) == (FAILED, "")
-    assert "the motors could not be stopped" in capfd.readouterr().err
+@pytest.mark.parametrize(
+    ("stop", "done", "report"), [(BROKEN, "stopped anew", "were stopped"), (HOPELESS, "", "could not be stopped")]
+)
+def test_standby_that_fails_is_replaced_once_and_the_outcome_reported(tmp_path, capfd, stop, done, report):
+    assert guarded(tmp_path, f"tell({RUNS!r})", stop) == (FAILED, done)
+    assert f"the motors {report}" in capfd.readouterr().err
 
 
 def test_exit_after_an_emergency_stop_has_the_code_ended(tmp_path):
@@ -204,13 +209,3 @@ def test_signal_to_the_guard_reaches_the_agent(tmp_path, number):
         "while True: signal.pause()"
     )
     assert guarded(tmp_path, agent) == (0, "")
-
-
-def test_agent_that_ignores_signals_is_ended(tmp_path, monkeypatch, capfd):
-    monkeypatch.setattr(guard_module, "GRACE_S", SHORT_S)
-    agent = (
-        f"signal.signal(signal.SIGTERM, signal.SIG_IGN)\ntell({RUNS!r})\nos.kill(os.getppid(), signal.SIGTERM)\n"
-        "while True: signal.pause()"
-    )
-    assert guarded(tmp_path, agent) == (FAILED, "stopped")
-    assert "its process ended (SIGKILL)" in capfd.readouterr().err

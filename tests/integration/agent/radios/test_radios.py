@@ -1,7 +1,5 @@
-"""Radios of real robots."""
-
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 import numpy as np
 import pytest
@@ -17,6 +15,7 @@ from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.packets import Payloads, SentPackets
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
+from swarmwire.comms.wire.sessions import closed_after
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, RadioBridge
 from tests.support.clocks import until
 from tests.support.swarms import (
@@ -55,14 +54,10 @@ def by_air() -> Generator[RobotRadio]:
     bridge = RadioBridge(
         Network(ANY_PORT), KEYS, {"flock-1": 1}, BridgedRadio(ROBOTS, 10, 100, ("rssi_dbm",), ("radio.rssi",))
     )
-    session = open_swarm(Network(connect=bridge.open()))
-    try:
+    with closing(bridge), closed_after(open_swarm(Network(connect=bridge.open()))) as session:
         opened = WorldRadio(session, KEYS, ROBOTS, "flock-1", WallClock())
         opened.open()
         yield opened
-    finally:
-        session.close()
-        bridge.close()
 
 
 @pytest.fixture(params=[by_zenoh, by_zenoh_and_tracker, by_air])
@@ -252,20 +247,14 @@ def test_peer_that_returns_is_received_again():
 def test_peer_that_returns_at_its_endpoint_is_connected_again():
     with peers(1) as (first,):
         endpoint = endpoints_of(first, Network(listen=ANY_PORT))
-        caller = open_swarm(Network(connect=endpoint))
-        try:
+        with closed_after(open_swarm(Network(connect=endpoint))) as caller:
             b = radio(caller, "flock-1")
             meet(first, [b])
             first.close()
-            again = open_swarm(Network(listen=endpoint))
-            try:
+            with closed_after(open_swarm(Network(listen=endpoint))) as again:
                 meet(again, [b])
                 radio(again, "flock-0").send(words(9.0))
                 assert received_by(b, 1) == [(0, 0, 9.0)]
-            finally:
-                again.close()
-        finally:
-            caller.close()
 
 
 def test_closed_radio_receives_nothing():

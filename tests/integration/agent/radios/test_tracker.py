@@ -1,5 +1,3 @@
-"""Trackers and operators in the robots' network."""
-
 import json
 import math
 import struct

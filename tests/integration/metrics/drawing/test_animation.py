@@ -1,5 +1,3 @@
-"""Animated pages and films of runs."""
-
 import re
 import subprocess
 from dataclasses import replace

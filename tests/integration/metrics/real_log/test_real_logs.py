@@ -1,5 +1,3 @@
-"""Logs of real robots."""
-
 import json
 import shutil
 from dataclasses import replace

@@ -1,5 +1,3 @@
-"""Reports of campaigns."""
-
 import json
 import math
 

@@ -1,5 +1,3 @@
-"""Reports of runs."""
-
 import json
 from dataclasses import asdict, replace
 

@@ -55,16 +55,27 @@ def fill(folder, **changes):
     (folder / "trajectory.digests").write_bytes(bytes(8 * (TICKS - 1)) + DIGEST)
 
 
-def test_events_of_single_robots_are_counted_by_the_arenas_that_they_concern(tmp_path):
-    fill(tmp_path)
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    path = tmp_path / "events.parquet"
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    fill(folder := tmp_path_factory.mktemp("whole"))
+    return folder
+
+
+@pytest.fixture
+def folder(whole, tmp_path):
+    """A copy of a whole run folder."""
+    return shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
+
+
+def test_events_of_single_robots_are_counted_by_the_arenas_that_they_concern(folder):
+    summary = json.loads((folder / "summary.json").read_text())
+    path = folder / "events.parquet"
     table = pl.read_parquet(path)
     table.slice(1).write_parquet(path)
-    assert states(tmp_path) == {"events": TableState.DIFFERS}
+    assert states(folder) == {"events": TableState.DIFFERS}
     summary["events"][0] |= {"singly": True, "robots": [[], ["flock-1"]]}
-    (tmp_path / "summary.json").write_text(json.dumps(summary))
-    assert states(tmp_path) == {}
+    (folder / "summary.json").write_text(json.dumps(summary))
+    assert states(folder) == {}
 
 
 def states(folder):
@@ -75,63 +86,54 @@ def text_of(folder, part):
     return next(finding.text for finding in verify(folder) if finding.part == part)
 
 
-def test_whole_run_folder_has_no_fault_and_is_unchanged_by_verify(tmp_path):
-    fill(tmp_path)
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*")}
-    findings = verify(tmp_path)
+def test_whole_run_folder_has_no_fault_and_is_unchanged_by_verify(folder):
+    before = {path: path.read_bytes() for path in folder.rglob("*")}
+    findings = verify(folder)
     assert all(finding.good for finding in findings)
     files = ("summary.json", "static.json", "log.txt", "run.json", "trajectory.digests", "run.rrd")
     assert {finding.part for finding in findings} == {*files, *TABLES}
     assert {finding.part for finding in findings if finding.state == TableState.NOT_RECORDED} == {
         "run.rrd",
-        *({*TABLES} - {path.stem for path in tmp_path.glob("*.parquet")}),
+        *({*TABLES} - {path.stem for path in folder.glob("*.parquet")}),
     }
     assert {"ticks", "packets", "events"} <= {
         finding.part for finding in findings if finding.state == TableState.INTACT
     }
-    assert "20 rows" in text_of(tmp_path, "ticks")
-    assert "up to tick 9 (0.9 s)" in text_of(tmp_path, "ticks")
-    assert {path: path.read_bytes() for path in tmp_path.rglob("*")} == before
+    assert "20 rows" in text_of(folder, "ticks")
+    assert "up to tick 9 (0.9 s)" in text_of(folder, "ticks")
+    assert {path: path.read_bytes() for path in folder.rglob("*")} == before
 
 
-@pytest.mark.parametrize(
-    ("path", "wrong"),
-    [
-        ("summary.json", {"summary.json": TableState.MISSING, "trajectory.digests": TableState.PARTIAL}),
-        ("static.json", {"static.json": TableState.MISSING}),
-        ("log.txt", {"log.txt": TableState.MISSING}),
-        ("run.json", {"run.json": TableState.MISSING}),
-        ("trajectory.digests", {"trajectory.digests": TableState.MISSING}),
-        ("ticks.parquet", {"ticks": TableState.MISSING}),
-        ("packets.parquet", {"packets": TableState.MISSING}),
-        ("events.parquet", {"events": TableState.MISSING}),
-    ],
-)
-def test_missing_file_of_a_run_folder_is_named(tmp_path, path, wrong):
-    fill(tmp_path)
-    (tmp_path / path).unlink()
-    assert states(tmp_path) == wrong
+def with_digests(path, state):
+    """What is wrong if this alone is wrong with this file: without the summary nothing proves the digests."""
+    without = {"trajectory.digests": TableState.PARTIAL} if path == "summary.json" else {}
+    return {path.removesuffix(".parquet"): state, **without}
 
 
-@pytest.mark.parametrize("part", ["summary.json", "static.json", "ticks.parquet", "packets.parquet", "events.parquet"])
+PARTS = ["summary.json", "static.json", "ticks.parquet", "packets.parquet", "events.parquet"]
+
+
+@pytest.mark.parametrize("path", [*PARTS, "log.txt", "run.json", "trajectory.digests"])
+def test_missing_file_of_a_run_folder_is_named(folder, path):
+    (folder / path).unlink()
+    assert states(folder) == with_digests(path, TableState.MISSING)
+
+
+@pytest.mark.parametrize("path", PARTS)
 @pytest.mark.parametrize("cut", [0.0, 0.5, 0.98])
-def test_truncated_file_of_a_run_folder_is_damaged(tmp_path, part, cut):
-    fill(tmp_path)
-    data = (tmp_path / part).read_bytes()
-    (tmp_path / part).write_bytes(data[: int(cut * len(data))])
-    findings = states(tmp_path)
-    assert findings.pop(part.removesuffix(".parquet")) == TableState.DAMAGED
-    assert findings == ({"trajectory.digests": TableState.PARTIAL} if part == "summary.json" else {})
+def test_truncated_file_of_a_run_folder_is_damaged(folder, path, cut):
+    data = (folder / path).read_bytes()
+    (folder / path).write_bytes(data[: int(cut * len(data))])
+    assert states(folder) == with_digests(path, TableState.DAMAGED)
 
 
-def test_bytes_turned_over_within_a_table_are_found(tmp_path):
-    fill(tmp_path)
-    path = tmp_path / "ticks.parquet"
+def test_bytes_turned_over_within_a_table_are_found(folder):
+    path = folder / "ticks.parquet"
     data = bytearray(path.read_bytes())
     for position in range(4, len(data) // 2):
         data[position] ^= 0xFF
     path.write_bytes(data)
-    assert states(tmp_path) == {"ticks": TableState.DAMAGED}
+    assert states(folder) == {"ticks": TableState.DAMAGED}
 
 
 def killed(folder, monkeypatch, in_chunk=3):
@@ -158,12 +160,11 @@ def test_killed_run_without_a_first_part_is_partial(tmp_path, monkeypatch):
     assert states(tmp_path)["ticks"] is TableState.PARTIAL
 
 
-def test_parts_left_beside_the_whole_table_are_no_fault(tmp_path):
-    fill(tmp_path)
-    (tmp_path / "ticks").mkdir()
-    shutil.copy(tmp_path / "ticks.parquet", tmp_path / "ticks" / "part-000001.parquet")
-    assert states(tmp_path) == {}
-    assert "parts" in text_of(tmp_path, "ticks")
+def test_parts_left_beside_the_whole_table_are_no_fault(folder):
+    (folder / "ticks").mkdir()
+    shutil.copy(folder / "ticks.parquet", folder / "ticks" / "part-000001.parquet")
+    assert states(folder) == {}
+    assert "parts" in text_of(folder, "ticks")
 
 
 def test_damaged_or_missing_part_is_named(tmp_path, monkeypatch):
@@ -177,12 +178,11 @@ def test_damaged_or_missing_part_is_named(tmp_path, monkeypatch):
     assert "part-000001.parquet" in text_of(tmp_path, "ticks")
 
 
-def test_ticks_that_were_dropped_make_the_table_partial(tmp_path):
-    fill(tmp_path)
-    table = pl.read_parquet(tmp_path / "ticks.parquet")
-    table.filter(~pl.col("tick").is_in([4, 5])).write_parquet(tmp_path / "ticks.parquet")
-    assert states(tmp_path) == {"ticks": TableState.PARTIAL}
-    assert "2 ticks" in text_of(tmp_path, "ticks")
+def test_ticks_that_were_dropped_make_the_table_partial(folder):
+    table = pl.read_parquet(folder / "ticks.parquet")
+    table.filter(~pl.col("tick").is_in([4, 5])).write_parquet(folder / "ticks.parquet")
+    assert states(folder) == {"ticks": TableState.PARTIAL}
+    assert "2 ticks" in text_of(folder, "ticks")
 
 
 @pytest.mark.parametrize(
@@ -204,10 +204,9 @@ def test_tables_that_differ_from_the_summary_are_found(tmp_path, change, part, h
     assert all(hint in text_of(tmp_path, part) for hint in hints)
 
 
-def test_missing_arena_in_a_table_is_found(tmp_path):
-    fill(tmp_path)
-    pl.read_parquet(tmp_path / "ticks.parquet").filter(pl.col("arena") == 0).write_parquet(tmp_path / "ticks.parquet")
-    assert states(tmp_path) == {"ticks": TableState.DIFFERS}
+def test_missing_arena_in_a_table_is_found(folder):
+    pl.read_parquet(folder / "ticks.parquet").filter(pl.col("arena") == 0).write_parquet(folder / "ticks.parquet")
+    assert states(folder) == {"ticks": TableState.DIFFERS}
 
 
 def test_fates_are_not_compared_where_packets_were_sampled_or_dropped_or_the_run_broken_off(tmp_path):
@@ -243,28 +242,26 @@ def test_folder_without_a_run_is_refused_by_verify(tmp_path):
             verify(folder)
 
 
-def test_recording_is_verified_to_its_end(tmp_path):
+def test_recording_is_verified_to_its_end(folder):
     pytest.importorskip("rerun", reason="needs the extra [view]")
     from tests.support.metrics import recordings
 
-    fill(tmp_path)
     run = static(3)
-    recordings.record(tmp_path / "run.rrd", run, recordings.moving(run, 7))
-    assert states(tmp_path) == {}
-    assert "up to tick 6" in text_of(tmp_path, "run.rrd")
-    data = (tmp_path / "run.rrd").read_bytes()
-    (tmp_path / "run.rrd").write_bytes(data[: len(data) * 9 // 10])  # behind the layout of the views
-    assert states(tmp_path) == {"run.rrd": TableState.PARTIAL}
-    assert "closed" in text_of(tmp_path, "run.rrd")
-    (tmp_path / "run.rrd").write_bytes(b"no recording")
-    assert states(tmp_path) == {"run.rrd": TableState.DAMAGED}
+    recordings.record(folder / "run.rrd", run, recordings.moving(run, 7))
+    assert states(folder) == {}
+    assert "up to tick 6" in text_of(folder, "run.rrd")
+    data = (folder / "run.rrd").read_bytes()
+    (folder / "run.rrd").write_bytes(data[: len(data) * 9 // 10])  # behind the layout of the views
+    assert states(folder) == {"run.rrd": TableState.PARTIAL}
+    assert "closed" in text_of(folder, "run.rrd")
+    (folder / "run.rrd").write_bytes(b"no recording")
+    assert states(folder) == {"run.rrd": TableState.DAMAGED}
 
 
-def test_without_rerun_a_recording_is_only_seen(tmp_path, monkeypatch):
+def test_without_rerun_a_recording_is_only_seen(folder, monkeypatch):
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
-    fill(tmp_path)
-    shutil.copy(tmp_path / "log.txt", tmp_path / "run.rrd")
-    assert "not read" in text_of(tmp_path, "run.rrd")
+    shutil.copy(folder / "log.txt", folder / "run.rrd")
+    assert "not read" in text_of(folder, "run.rrd")
 
 
 @pytest.mark.parametrize(
@@ -277,42 +274,30 @@ def test_without_rerun_a_recording_is_only_seen(tmp_path, monkeypatch):
         ("log.txt", b"\xff\xfe", TableState.DAMAGED),
         ("trajectory.digests", DIGEST, TableState.DIFFERS),
         ("trajectory.digests", bytes(8 * TICKS), TableState.DIFFERS),
+        *((name, None, TableState.DAMAGED) for name in ("summary.json", "run.json", "trajectory.digests", "log.txt")),
     ],
 )
-def test_file_with_other_contents_is_found(tmp_path, name, content, state):
-    fill(tmp_path)
-    (tmp_path / name).write_bytes(content)
-    assert states(tmp_path)[name] == state
+def test_file_with_other_contents_or_a_folder_in_its_place_is_found(folder, name, content, state):
+    (folder / name).unlink()
+    (folder / name).mkdir() if content is None else (folder / name).write_bytes(content)
+    assert states(folder)[name] == state
 
 
-def test_table_that_crashes_the_reader_is_damaged(tmp_path, monkeypatch):
+def test_table_that_crashes_the_reader_is_damaged(folder, monkeypatch):
     def breaks(*_):
         raise pl.exceptions.PanicException("assertion failed: offset + length <= self.length")
 
-    fill(tmp_path)
     monkeypatch.setattr("swarmwire.metrics.records.run_folder.reader.scan_files", breaks)
     with pytest.raises(BadInput, match="ticks.*assertion failed.*swarmwire verify"):
-        RunFolder(tmp_path).ticks()
+        RunFolder(folder).ticks()
     monkeypatch.setattr(TABLES["ticks"], "compare", breaks)
-    assert states(tmp_path)["ticks"] == TableState.DAMAGED
+    assert states(folder)["ticks"] == TableState.DAMAGED
 
 
-def test_folder_in_place_of_a_file_is_damaged(tmp_path):
-    fill(tmp_path)
-    for name in ("summary.json", "run.json", "trajectory.digests", "log.txt"):
-        (tmp_path / name).unlink()
-        (tmp_path / name).mkdir()
-    findings = states(tmp_path)
-    assert [findings[name] for name in ("summary.json", "run.json", "trajectory.digests", "log.txt")] == [
-        TableState.DAMAGED
-    ] * 4
-
-
-def test_table_with_other_columns_is_damaged(tmp_path):
-    fill(tmp_path)
-    pl.DataFrame({"x": [1]}).write_parquet(tmp_path / "packets.parquet")
-    assert states(tmp_path) == {"packets": TableState.DAMAGED}
-    assert "no column" in text_of(tmp_path, "packets")
+def test_table_with_other_columns_is_damaged(folder):
+    pl.DataFrame({"x": [1]}).write_parquet(folder / "packets.parquet")
+    assert states(folder) == {"packets": TableState.DAMAGED}
+    assert "no column" in text_of(folder, "packets")
 
 
 def test_inputs_are_compared_with_the_summary(tmp_path):

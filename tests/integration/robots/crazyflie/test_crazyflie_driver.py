@@ -16,7 +16,7 @@ from swarmwire.comms.robot.bodies.body import body_from, load_body
 from swarmwire.comms.wire.keys import SwarmKeys
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import ESTOP, ask_all, endpoints_of, open_swarm
-from swarmwire.comms.wire.sessions import close_session
+from swarmwire.comms.wire.sessions import closed_after
 from swarmwire.world.gateways.crazyflie.flight import STANDSTILL, SupervisorState
 from tests.integration.robots.crazyflie.test_crazyflie_gateway import Room, room
 from tests.support.agent.on_robot.installed import Command as Program
@@ -129,11 +129,10 @@ def test_killed_agent_leaves_no_crazyflie_in_the_air(room: Room, tmp_path: Path)
 def test_emergency_stop_of_an_operator_is_confirmed_and_the_agent_ends(room: Room, tmp_path: Path) -> None:
     flight = room.gateway._robots[0].flight
     network = Network(listen=("tcp/127.0.0.1:0",))
-    session = open_swarm(network)
     options = ("--driver", "crazyflie", "--address", room.uri, "--radio", "zenoh", "--watchdog-s", "5")
-    connect = ("--connect", endpoints_of(session, network)[0])
     environment = {**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}
-    try:
+    with closed_after(open_swarm(network)) as session:
+        connect = ("--connect", endpoints_of(session, network)[0])
         with Program(environment, "run", f"{PLAYERS}:Driving", *options, *connect) as command:
             until(lambda: flight.height_m > 0.4)
             assert ask_all(session, SwarmKeys("swarm"), ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
@@ -144,20 +143,13 @@ def test_emergency_stop_of_an_operator_is_confirmed_and_the_agent_ends(room: Roo
             assert ask_all(session, SwarmKeys("swarm"), ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
             command.process.terminate()
             assert command.wait()[0] == 0
-    finally:
-        close_session(session)
 
 
-def test_address_without_a_crazyflie_is_reported(room: Room) -> None:
-    driver = CrazyflieDriver("udp://127.0.0.1:9", load_body("crazyflie"), CrazyflieOptions(connect_s=0.5), room.clock)
-    with pytest.raises(DriverLost):
-        driver.open()
+def test_address_without_a_crazyflie_or_a_radio_is_lost_and_not_logged(room: Room, caplog) -> None:
+    for address in ("udp://127.0.0.1:9", "radio://9/80/2M/E7E7E7E7E7"):
+        away = CrazyflieDriver(address, load_body("crazyflie"), CrazyflieOptions(connect_s=0.5), room.clock)
+        with pytest.raises(DriverLost, match=f"no Crazyflie answers at {address}"):
+            away.open()
+    assert not [record for record in caplog.records if record.name.startswith("cflib")]
     with pytest.raises(BadInput, match="address"):
         CrazyflieDriver("192.168.1.1", load_body("crazyflie"), QUICK, room.clock)
-
-
-def test_missing_radio_is_raised_and_not_logged(room: Room, caplog) -> None:
-    away = CrazyflieDriver("radio://9/80/2M/E7E7E7E7E7", load_body("crazyflie"), QUICK, room.clock)
-    with pytest.raises(DriverLost, match="no Crazyflie answers at radio://9/80/2M/E7E7E7E7E7"):
-        away.open()
-    assert not [record for record in caplog.records if record.name.startswith("cflib")]

@@ -1,5 +1,3 @@
-"""An emulated e-puck2, pass by pass."""
-
 import socket
 from collections import Counter
 from collections.abc import Iterator
@@ -114,25 +112,15 @@ def test_robot_reads_commands_in_any_fragments(cuts: list[int]) -> None:
         assert not task.counts
 
 
-def test_answers_wait_for_a_slow_client_and_commands_do_not(task: Task) -> None:
+@pytest.mark.parametrize(("commands", "request_", "size", "passes"), [(30, {}, 105, 2), (3, {"request": 3}, 38401, 1)])
+def test_answers_wait_for_a_slow_client_and_commands_do_not(task, commands, request_, size, passes) -> None:
     client = task.client()
-    for i in range(30):
-        client.sendall(command(left=i))
+    for i in range(commands):
+        client.sendall(command(left=i, **request_))
         task.do(2)
-    assert task.lefts() == list(range(30))
-    assert len(read(client)) == 105
-    task.do(2)
-    assert len(read(client)) == 105
-
-
-def test_sensors_are_read_after_the_image_is_sent(task: Task) -> None:
-    client = task.client()
-    for i in range(3):
-        client.sendall(command(left=i, request=3))
-        task.do(2)
-    assert task.lefts() == [0, 1, 2]
-    assert len(read(client)) == 38401
-    task.do(1)
+    assert task.lefts() == list(range(commands))
+    assert len(read(client)) == size  # an image is complete before the sensors are read
+    task.do(passes)
     assert len(read(client)) == 105
 
 

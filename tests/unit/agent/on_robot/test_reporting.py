@@ -1,5 +1,3 @@
-"""What a robot's agent reports, and its commands."""
-
 import json
 import os
 import re

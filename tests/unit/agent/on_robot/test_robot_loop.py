@@ -1,5 +1,3 @@
-"""The loop of a robot's agent, and its log."""
-
 import csv
 import errno
 import io

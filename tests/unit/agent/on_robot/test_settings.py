@@ -1,5 +1,3 @@
-"""Settings of a robot's agent, and what becomes of them."""
-
 import hashlib
 import math
 import re

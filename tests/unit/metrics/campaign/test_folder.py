@@ -1,5 +1,3 @@
-"""Campaigns are read back from their folders, and compared."""
-
 import csv
 import json
 import math

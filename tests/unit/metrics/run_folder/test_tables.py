@@ -1,5 +1,3 @@
-"""The tables of ticks, packets and events."""
-
 from dataclasses import replace
 
 import numpy as np
