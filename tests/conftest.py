@@ -46,6 +46,8 @@ ORDER = (
     "agent/behaviours",
     "metrics",
     "",
+    "agent/test_onnx_policy",
+    "learn",
     "deploy",
     "test_",
 )
