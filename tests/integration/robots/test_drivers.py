@@ -84,8 +84,7 @@ def test_odometry_adds_up_over_any_distance(connected: Rig, distances: list[tupl
 @given(share=st.floats(-0.5, 0.5), turn=st.floats(-0.5, 0.5))
 def test_speeds_within_the_limits_arrive_unchanged(connected: Rig, share: float, turn: float) -> None:
     linear_mps, angular_radps = share * connected.body.max_linear_mps, turn * connected.body.max_angular_radps
-    connected.driver.act(Command(linear_mps, angular_radps))
-    connected.until_told(linear_mps, angular_radps)
+    drive(connected, linear_mps, angular_radps)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -122,9 +121,16 @@ def test_driver_stops_its_robot_when_opened(rig: Rig) -> None:
         rig.until_told(0.0, 0.0)
 
 
-def test_driver_stops_its_robot_when_closed(connected: Rig) -> None:
-    connected.driver.act(Command(0.05, 0.0))
-    connected.until_told(0.05, 0.0)
+def drive(rig: Rig, linear_mps: float = 0.05, angular_radps: float = 0.0) -> None:
+    rig.driver.act(Command(linear_mps, angular_radps))
+    rig.until_told(linear_mps, angular_radps)
+
+
+def test_driver_stops_its_robot_when_closed_and_when_opened_again(connected: Rig) -> None:
+    drive(connected)
+    connected.driver.open()
+    connected.until_told(0.0, 0.0)
+    drive(connected, 0.03)
     connected.driver.close()
     connected.until_told(0.0, 0.0)
     connected.driver.close()
@@ -173,8 +179,7 @@ def test_dead_robot_applies_no_command(connected: Rig) -> None:
 
 
 def test_revived_robot_is_at_rest(connected: Rig) -> None:
-    connected.driver.act(Command(0.05, 0.0))
-    connected.until_told(0.05, 0.0)
+    drive(connected)
     connected.publish(readings(0.0), alive=False)
     connected.publish(readings(0.0))
     connected.until_told(0.0, 0.0)
@@ -199,19 +204,9 @@ def rolled(travel_m: float) -> Fields:
     return {"odometry.left_m": np.array([travel_m]), "odometry.right_m": np.array([travel_m])}
 
 
-def test_driver_that_reconnects_stops_its_robot_first(connected: Rig) -> None:
-    connected.driver.act(Command(0.05, 0.0))
-    connected.until_told(0.05, 0.0)
-    connected.driver.open()
-    connected.until_told(0.0, 0.0)
-    connected.driver.act(Command(0.03, 0.0))
-    connected.until_told(0.03, 0.0)
-
-
 def test_motors_can_be_stopped_by_another_thread_during_a_read(connected: Rig) -> None:
     driver, done = connected.driver, Event()
-    driver.act(Command(0.05, 1.0))
-    connected.until_told(0.05, 1.0)
+    drive(connected, 0.05, 1.0)
 
     def read() -> None:
         while not done.is_set():
@@ -229,16 +224,14 @@ def test_motors_can_be_stopped_by_another_thread_during_a_read(connected: Rig) -
 def test_stopped_robot_drives_with_the_next_command(connected: Rig) -> None:
     connected.driver.act(Command(0.05, 0.0))
     connected.driver.stop()
-    connected.driver.act(Command(0.03, 0.0))
-    connected.until_told(0.03, 0.0)
+    drive(connected, 0.03)
 
 
 def test_watchdog_stops_a_robot_whose_agent_is_silent(connected: Rig) -> None:
     watchdog = Watchdog(0.1, connected.driver.stop, connected.clock)
     watchdog.start()
     try:
-        connected.driver.act(Command(0.05, 1.0))
-        connected.until_told(0.05, 1.0)
+        drive(connected, 0.05, 1.0)
         watchdog.feed()
         connected.until_told(0.0, 0.0)
         until(lambda: watchdog.stops == 1)
@@ -275,8 +268,7 @@ def test_answers_are_read_byte_by_byte(rig: OwnWireRig, link: FaultyLink) -> Non
 def test_commands_are_read_byte_by_byte(rig: OwnWireRig, link: FaultyLink) -> None:
     link.commands = ByteByByte()
     for linear_mps in (0.05, -0.02):
-        rig.driver.act(Command(linear_mps, 1.0))
-        rig.until_told(linear_mps, 1.0)
+        drive(rig, linear_mps, 1.0)
 
 
 @ON_OWN_WIRE
@@ -327,8 +319,7 @@ def test_stop_does_not_wait_for_a_robot_out_of_reach(rig: OwnWireRig, link: Faul
 
 @ON_OWN_WIRE
 def test_robot_continues_its_last_command_after_a_lost_link(rig: OwnWireRig, link: FaultyLink) -> None:
-    rig.driver.act(Command(0.05, 0.0))
-    rig.until_told(0.05, 0.0)
+    drive(rig)
     link.answers = CutAfter(0, hang_up=True)
     sense_until_lost(rig)
     speeds = rig.pop_commands().speeds

@@ -148,21 +148,11 @@ def test_disk_that_refuses_a_total_fails_the_record(tmp_path, kind):
         recorder.end(None)
 
 
-def line(*x_m):
-    pose = np.zeros((len(x_m), 3))
-    pose[:, 0] = x_m
-    return pose
-
-
 def seen_by(run, *ticks):
     counts = DistanceCounts(run)
     for tick, fields in enumerate(ticks):
         counts.see(truth(run, tick, **fields))
     return counts
-
-
-def bins(table, arena=0):
-    return {index: int(table[arena, index]) for index in np.flatnonzero(table[arena])}
 
 
 @pytest.mark.parametrize(("range_m", "width_m"), [(2.0, 0.1), (3.9, 0.1), (4.0, 0.2), (100.0, 5.0), (0.05, 0.002)])
@@ -194,18 +184,13 @@ def test_distance_counts_leave_out_packets_that_never_went_on_air():
     assert not seen_by(static(4), fields).intended.any()
 
 
-def test_distance_counts_of_receptions_too_late_are_unknown(monkeypatch):
-    monkeypatch.setattr(distances, "POSES_S", 0.2)
-    nothing = {"departed": departed([]), "finished": links([], [], 0, 0)}
-    late = {**nothing, "finished": links([0], [1], 0, 0)}
-    assert [seen_by(static(2), *[nothing] * ticks, late).unknown for ticks in (2, 3)] == [0, 1]
-
-
 def test_distance_counts_of_packets_on_air_for_too_long_are_unknown_also_if_all_are_lost(monkeypatch):
     monkeypatch.setattr(distances, "POSES_S", 0.2)
     nothing = {"departed": departed([]), "finished": links([], [], 0, 0)}
+    late = {**nothing, "finished": links([0], [1], 0, 0)}
     lost = {"departed": departed([0], intended=2), "finished": links([0], [1], 0, 0, fate=Fate.LOST)}
-    assert [seen_by(static(3), *[nothing] * ticks, lost).unknown for ticks in (2, 3)] == [0, 2]
+    for last, unknown in ((late, 1), (lost, 2)):
+        assert [seen_by(static(3), *[nothing] * ticks, last).unknown for ticks in (2, 3)] == [0, unknown]
 
 
 @pytest.mark.parametrize("pairs_per_tick", [10**6, 10, 3])
