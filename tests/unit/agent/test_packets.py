@@ -5,11 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from swarmwire.agent import Agent, Packet, Robot, Robots, TxResult, TxStatus
+from swarmwire.agent import Agent, Robot, Robots, TxResult, TxStatus
 from swarmwire.agent.agent_group import _SingleGroup
 from swarmwire.agent.executor import AgentExecutor
 from swarmwire.agent.local_backend import LocalBackend
-from swarmwire.agent.packet import Columns, Packets
 from swarmwire.agent.radios.zenoh_radio import HEADER_BYTES, PacketHeader
 from swarmwire.agent.testing import Trial, assert_equivalent, assert_rows_independent
 from swarmwire.comms.base.errors import AgentFailed, BadFrame
@@ -22,27 +21,6 @@ TRIALS = [Trial(), Trial(robots=1), Trial(robots=30, ticks=20, seed=7)]
 headers = st.builds(
     PacketHeader, st.integers(-1, 2**15 - 1), st.integers(0, 2**32 - 1), st.integers(-(2**63), 2**63 - 1)
 )
-
-
-def test_packets_of_one_robot_equal_columns_of_many():
-    lists: list[list[tuple[object, ...]]] = []
-
-    def single(robot: Robot) -> None:
-        packets: list[Packet[Word]] = robot.radio.received(Word)
-        assert all(isinstance(packet, Packet) for packet in packets)
-        lists.append([(packet.sender, packet.range_m, packet.message.number) for packet in packets])
-
-    def vector(robots: Robots) -> None:
-        packets: Packets[Word] = robots.radio.received(Word)
-        assert isinstance(packets.message, Columns)
-        columns = (packets.sender, packets.range_m, packets.message.number)
-        lists.append(list(zip(*(column.tolist() for column in columns), strict=True)))
-
-    needs = ("radio.range", "radio.bearing")
-    for kind in (agent_doing(single, *needs), vector_agent_doing(vector, *needs)):
-        step(agents_for(kind, [5]), 0, [5], received_from(words(0, 2), [5]))
-    assert lists[0] == lists[1]
-    assert [sender for sender, _, _ in lists[0]] == [0, 2]
 
 
 class Keeps(Agent):
