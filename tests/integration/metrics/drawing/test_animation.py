@@ -84,7 +84,7 @@ def test_states_beyond_the_colours_share_one_and_the_frequent_have_their_own():
 
 def test_obstacles_and_lights_are_drawn_and_movable_ones_look_otherwise_and_are_in_the_legend():
     pillar, box, _ = OBSTACLES
-    colors = shown(film(), 0, *((thing.x_m, thing.y_m) for thing in (*OBSTACLES, LIGHT)), (2.5, 0.5))
+    colors = shown(film(), 0, *((shape.x_m, shape.y_m) for shape in (*OBSTACLES, LIGHT)), (2.5, 0.5))
     assert colors == [OBSTACLE, OBSTACLE, OBSTACLE, (0xFF, 0xD2, 0x3F), FLOOR]
     static = replace(two_groups(), obstacles=((pillar, replace(box, mass_kg=0.2)),))
     movable = np.broadcast_to([box.x_m, box.y_m, box.heading_rad], (31, 1, 3))

@@ -56,15 +56,15 @@ def fill(folder, **changes):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def undamaged(tmp_path_factory):
     fill(folder := tmp_path_factory.mktemp("whole"))
     return folder
 
 
 @pytest.fixture
-def folder(whole, tmp_path):
-    """A copy of a whole run folder."""
-    return shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
+def folder(undamaged, tmp_path):
+    """A copy of an undamaged run folder."""
+    return shutil.copytree(undamaged, tmp_path, dirs_exist_ok=True)
 
 
 def test_events_of_single_robots_are_counted_by_the_arenas_that_they_concern(folder):
