@@ -310,6 +310,13 @@ def test_memory_of_a_one_robot_agent_is_dropped() -> None:
     assert second.act(4, one_group(4, ROWS), ReceivedPackets.none(MEASURES)).linear_mps.tolist() == [1.0] * len(ROWS)
 
 
+def test_memory_of_parts_is_joined_in_the_order_of_the_robots() -> None:
+    undivided = GroupMemory(np.arange(6), {"x": np.arange(6) * 0.5, "y": np.arange(12).reshape(6, 2)})
+    joined = GroupMemory.joined([undivided.for_rows(np.array(rows)) for rows in ([1, 3, 5], [0, 2], [4])])
+    assert joined.rows.tolist() == undivided.rows.tolist()
+    assert all(np.array_equal(joined.columns[name], column) for name, column in undivided.columns.items())
+
+
 @pytest.mark.parametrize(
     "changed",
     [
