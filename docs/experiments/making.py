@@ -33,7 +33,7 @@ BEGIN = ("run", "point", "seed")
 ENDS = ("ended", "stop_time_s", "stopped_by", "sim_time_s")  # those that a campaign has
 LAST = ("timing_wall_s",)
 MAX_BYTES = 2_000_000  # of all digests of an experiment: they are kept with the code
-LONG_ROWS, LONG_CELLS = 8, 20  # a table with at least as many of either is a CSV file
+LONG_ROWS, LONG_CELLS = 8, 35  # a table with at least as many of either is a CSV file
 TABLE = re.compile(r"(?:^\|.*\n)+", re.MULTILINE)
 BEGIN_MARK, END_MARK = "<!-- numbers -->", "<!-- /numbers -->"
 

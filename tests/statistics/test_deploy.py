@@ -25,6 +25,10 @@ SHIPPED = {
 PSO = ROOT / "scenarios" / "pso.toml"
 NEAR_M, SHARE = 0.5, 0.5  # success: this share of the robots is this near to the light, at once
 DEAF = "radio.loss=1.0"
+POSITIONED = [
+    "robots.particles.body=epuck-gps",
+    "robots.particles.agent=swarmwire.agent.behaviours:PsoSearchPositioned",
+]
 
 
 class Travel(Observer):
@@ -109,6 +113,13 @@ def successes(seeds: range, *overrides: str, scenario: Path = PSO) -> int:
     quartiles = times[[len(times) * q // 4 for q in (1, 2, 3)]]
     print(f"{overrides}: {count} of {len(seeds)}, quartiles {quartiles} s")
     return count
+
+
+@pytest.mark.parametrize(
+    ("overrides", "least", "most"), [([], 2, 3), (POSITIONED, 2, 3), ([DEAF], 0, 1)], ids=["vectors", "places", "deaf"]
+)
+def test_pso_finds_the_light_only_with_the_radio(overrides: list[str], least: int, most: int):
+    assert least <= successes(range(1, 4), "duration_s=120", *overrides) <= most
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,14 @@
 
 import multiprocessing
 import re
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from functools import partial
 from importlib.util import find_spec
 from itertools import groupby, pairwise
 from math import comb, exp, hypot, log10
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -104,7 +107,10 @@ def test_delivery_over_distance_matches_the_bit_errors_of_the_standard():
         if c.standard == "802.15.4":
             sinr = 10.0 ** (0.1 * (106.987 - 46.6777 - 30.0 * log10(c.size_m[0])))
             ber = (8 / 15) / 16 * sum((-1) ** k * comb(16, k) * exp(20.0 * sinr * (1 / k - 1)) for k in range(2, 17))
-            expected, sent = ((1.0 - ber) ** (8 * 37), c.seeds * c.measured_s * c.rate_hz)
+            expected, sent = (
+                (1.0 - ber) ** (8 * 37),
+                c.seeds * c.measured_s * c.rate_hz,
+            )
             error = (expected * (1.0 - expected) / sent) ** 0.5
             assert RECORD[c]["delivery"].mean() == pytest.approx(expected, abs=4.0 * error + 5e-5)
 
@@ -206,6 +212,28 @@ def test_ns3_command_compares_with_the_record_without_ns3(
     assert out.count("| 802.15.4 0.25M |") == len([c for c in SECTIONS["distance"]() if c.standard == "802.15.4"])
 
 
+def test_ns3_command_interrupted_leaves_no_partial_file_and_stops(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    begun: list[Configuration] = []
+
+    def ns3(c: Configuration) -> Received:
+        begun.append(c)
+        counts = np.zeros((c.seeds, c.nodes, c.nodes), np.int64)
+        return Received(counts, counts)
+
+    def interrupted(file: Path, **_: np.ndarray) -> None:
+        file.write_bytes(b"PK")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "find_spec", lambda _: True)
+    monkeypatch.setattr(command, "theirs", ns3)
+    monkeypatch.setattr(command, "ProcessPoolExecutor", OneAtATime)
+    monkeypatch.setattr(np, "savez_compressed", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        command.main(["--only", "distance", "--cache", str(tmp_path)])
+    assert list(tmp_path.iterdir()) == []
+    assert len(begun) < len(SECTIONS["distance"]())
+
+
 def test_record_of_a_section_keeps_the_rows_of_others(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     file = tmp_path / "ns3.json"
     file.write_text(comparison.RECORD.read_text(encoding="utf-8"), encoding="utf-8")
@@ -217,6 +245,25 @@ def test_record_of_a_section_keeps_the_rows_of_others(monkeypatch: pytest.Monkey
     assert removed not in rows
     assert rows[renewed]["delivery"].tolist() == [0.0] * renewed.seeds
     np.testing.assert_equal(rows[unchanged], RECORD[unchanged])
+
+
+class OneAtATime(Executor):
+    """A pool that does the first task at once, and the rest at its end unless they are cancelled."""
+
+    def __init__(self, *_: object) -> None:
+        self._left: list[tuple[Future[Received], Callable[[], Received]]] = []
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Received] = Future()
+        if not self._left:
+            future.set_result(fn(*args, **kwargs))
+        self._left.append((future, partial(fn, *args, **kwargs)))
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        for future, work in self._left:
+            if not future.done() and not (cancel_futures and future.cancel()):
+                future.set_result(work())
 
 
 def test_ns3_command_refuses_to_record_fewer_seeds(capsys: pytest.CaptureFixture[str]):

@@ -1,5 +1,7 @@
-"""Recorded runs of emulated bases pass the checks of slam_toolbox, Nav2 and tf2."""
+"""Recorded runs of emulated bases pass the checks of slam_toolbox, Nav2 and tf2, which find faults that are put in."""
 
+import copy
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -125,3 +127,82 @@ def test_scan_returns_lie_on_the_walls_of_the_arena(scenario):
     from_wall_m = np.abs(np.divide(SIZE_M, 2) - np.abs(in_arena)).min(axis=1)
     # With the scanner a quarter turn off: 1.0; with the late scanner stamped when it is published: 0.43.
     assert np.quantile(from_wall_m, 0.99) < 0.1
+
+
+Change = Callable[[Recording], object]
+
+
+def transform(**changed: object) -> Change:
+    """One of the transforms is another: of its parts, of its translation or of its rotation."""
+
+    def change(recording: Recording) -> None:
+        moved = recording.moved[5].transforms[0]
+        for part in (moved, moved.header, moved.transform.translation, moved.transform.rotation):
+            vars(part).update({name: value for name, value in changed.items() if name in vars(part)})
+
+    return change
+
+
+def scan(**changed: object) -> Change:
+    """One of the scans is another."""
+    return lambda recording: vars(recording.scans[3]).update(changed)
+
+
+def odometry(**changed: object) -> Change:
+    """One of the poses is another."""
+
+    def change(recording: Recording) -> None:
+        pose = recording.odometry[9].pose.pose
+        for part in (pose.position, pose.orientation):
+            vars(part).update({name: value for name, value in changed.items() if name in vars(part)})
+
+    return change
+
+
+def twists(turned_around: independent.Twist) -> Change:
+    return lambda recording: [setattr(message.twist, "twist", turned_around) for message in recording.odometry]
+
+
+def swapped(recording: Recording) -> None:
+    recording.moved[5], recording.moved[6] = recording.moved[6], recording.moved[5]
+
+
+NAMELESS = independent.header(10**18, "")
+FAULTS: dict[str, tuple[Change, str]] = {
+    "a transform from the past": (swapped, "TF_OLD_DATA"),
+    "a frame in itself": (transform(child_frame_id=ODOM), "TF_SELF_TRANSFORM"),
+    "no child": (transform(child_frame_id=""), "TF_NO_CHILD_FRAME_ID"),
+    "no frame": (transform(frame_id=""), "TF_NO_FRAME_ID"),
+    "not a number": (transform(x=float("nan")), "TF_NAN_INPUT"),
+    "a long quaternion": (transform(w=2.0), "TF_DENORMALIZED_QUATERNION"),
+    "two parents": (transform(frame_id="map"), "two parents"),
+    "no static frames": (lambda recording: recording.still.clear(), "LookupException"),
+    "transforms that end early": (
+        lambda recording: recording.moved.__delitem__(slice(20, None)),
+        "ExtrapolationException",
+    ),
+    "a scan of no frame": (scan(header=NAMELESS), "header"),
+    "a frame with a slash": (scan(header=independent.header(10**18, "/base_scan")), "header"),
+    "a ray too few": (lambda recording: recording.scans[3].ranges.pop(), "number of range readings"),
+    "the angle after the last": (scan(angle_max=6.4), "number of range readings"),
+    "clockwise rays": (scan(angle_increment=-0.01745), "angle_increment"),
+    "no range": (scan(range_max=0.0), "range_max"),
+    "ranges that cannot be": (scan(range_min=50.0), "range threshold"),
+    "rays after the last transform": (scan(time_increment=1.0), "ExtrapolationException"),
+    "scans in no order": (lambda recording: recording.scans.reverse(), "stamps do not rise"),
+    "a clock that lags": (lambda recording: recording.clock.__delitem__(slice(1, None)), "ahead of the clock"),
+    "a jump": (odometry(x=9.0), "a jump in odom"),
+    "another pose than tf": (odometry(y=1e-3), "odometry and tf differ"),
+    "an orientation of another length": (odometry(w=2.0), "orientation"),
+    "a negative variance": (lambda recording: recording.odometry[9].pose.covariance.__setitem__(0, -1.0), "covariance"),
+    "a base that drives backwards": (twists(independent.twist(-0.15, 0.4)), "x is not ahead"),
+    "clockwise turns": (twists(independent.twist(0.15, -0.4)), "turns are not counter-clockwise"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_checks_find_a_fault_in_a_recording(fault):
+    recording = copy.deepcopy(recorded("avoidance-turtlebot")[0])
+    change, name = FAULTS[fault]
+    change(recording)
+    assert name in faults_of(recording, *LIMITS["avoidance-turtlebot"])

@@ -15,7 +15,7 @@ from swarmwire.comms.robot.packets import NO_TX_STATUSES, Payloads, ReceivedPack
 from swarmwire.comms.robot.tick_io import SparseTable
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import open_swarm
-from swarmwire.comms.wire.sessions import close_session, closed_after
+from swarmwire.comms.wire.sessions import close_session
 from swarmwire.world.gateways.radio_bridge import BridgedRadio, EmulatedTracker, RadioBridge
 from tests.support.clocks import FakeClock, until
 from tests.support.metrics.truths import static
@@ -159,6 +159,18 @@ def test_bridge_delivers_packets_and_tx_status_to_each_robot():
         assert (packets.receiver.tolist(), packets.sequence.tolist(), tx_status.id.tolist()) == ([2], [8], [5])
 
 
+def test_bridge_sends_no_frame_without_packets(monkeypatch):
+    with bridged() as (bridge, _):
+        published: list[int] = []
+        encode = "swarmwire.world.gateways.radio_bridge.encode_bridged"
+        monkeypatch.setattr(encode, lambda *_: published.append(1) or b"")
+        bridge.publish(1, ReceivedPackets.none(MEASURES), NO_TX_STATUSES)
+        bridge.publish(2, received((0, 1, 1, 1)), NO_TX_STATUSES)  # no receiver behind the bridge
+        assert not published
+        bridge.publish(3, received((1, 0, 1, 1), (1, 2, 2, 2), (2, 0, 3, 3)), NO_TX_STATUSES)
+        assert len(published) == 2
+
+
 def test_reception_times_follow_the_clock_of_the_agent():
     with bridged() as (bridge, session):
         log, clock = KeptLog(), DatedClock()
@@ -200,9 +212,13 @@ def test_robot_that_does_not_fit_the_world_is_refused(robot, robots, medium, mes
 
 
 def test_missing_world_is_reported_after_a_timeout():
+    session = open_swarm(Network(listen=ANY_PORT))
     clock = DatedClock()
-    with closed_after(open_swarm(Network(listen=ANY_PORT))) as session, refused_input(match="flock-1"):
-        WorldRadio(session, KEYS, ROBOTS, "flock-1", clock, wall=clock).open()
+    try:
+        with refused_input(match="flock-1"):
+            WorldRadio(session, KEYS, ROBOTS, "flock-1", clock, wall=clock).open()
+    finally:
+        close_session(session)
     assert clock.slept_until[-1] - clock.slept_until[0] > 5 * NS_PER_S
 
 

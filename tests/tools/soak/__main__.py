@@ -1,6 +1,6 @@
 """`python -m tests.tools.soak`: an hour with faults all the time.
 
-`--judge FOLDER` only judges the hour of that folder again. docs/reliability.md has the results.
+`--judge FOLDER` only judges the hour of that folder again. docs/dev/release.md has the results.
 """
 
 import argparse

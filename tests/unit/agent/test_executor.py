@@ -11,14 +11,27 @@ from hypothesis import strategies as st
 
 from swarmwire.agent import Robot, Robots
 from swarmwire.agent.agent import AgentClass
+from swarmwire.agent.executor import AgentExecutor
 from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.base.sentinels import BROADCAST
 from swarmwire.comms.robot.messages import encode_dict
 from swarmwire.comms.robot.packets import TAG_BYTES, Payloads, ReceivedPackets, SentPackets
 from swarmwire.comms.robot.tick_io import Actions
-from tests.support.agent.hosts import SILENCE, agents_for, plain, readings, received_from, step, words
+from tests.support.agent.hosts import (
+    SILENCE,
+    agents_for,
+    assignment,
+    group,
+    one_group,
+    plain,
+    readings,
+    received_from,
+    spec,
+    step,
+    words,
+)
 from tests.support.agent.one_step import agent_doing, vector_agent_doing
-from tests.support.agent.players import Counter, Failing, Other, Unmade, VectorCounter, Word
+from tests.support.agent.players import Chatter, Counter, Failing, Other, Unmade, VectorCounter, Word
 
 
 def once(kind: AgentClass, rows: list[int], received: ReceivedPackets = SILENCE, tick: int = 0) -> Actions:
@@ -193,6 +206,16 @@ def test_returning_robot_starts_anew_and_others_keep_their_memory(kind: AgentCla
     assert steps == [[1, 1, 1], [2, 2, 2], [3, 3], [4, 1, 4], [], [1, 1]]
 
 
+@pytest.mark.parametrize("kind", ["Counter", "VectorCounter"])
+def test_memory_does_not_depend_on_other_robots_in_the_process(kind: str) -> None:
+    together = AgentExecutor(assignment(group(spec(kind), [2, 5])))
+    alone = {row: AgentExecutor(assignment(group(spec(kind), [row]))) for row in (2, 5)}
+    for tick, rows in enumerate(([2, 5], [2], [2, 5], [], [5], [2, 5])):
+        at_once = together.act(tick, one_group(tick, rows), SILENCE)
+        each = [alone[row].act(tick, one_group(tick, [row] if row in rows else []), SILENCE) for row in (2, 5)]
+        assert plain(at_once) == plain(Actions.joined(each))
+
+
 def test_step_is_not_called_without_robots() -> None:
     def check(robots: Robots) -> None:
         assert robots.n
@@ -241,6 +264,17 @@ def test_draws_of_a_row_equal_those_of_the_robot_alone(rows: list[int], tick: in
     single, vector = (once(kind(walk), rows, tick=tick) for kind in (agent_doing, vector_agent_doing))
     assert plain(single) == plain(vector)
     assert np.all((single.linear_mps >= -1.0) & (single.linear_mps < 3.0))
+
+
+def test_split_group_acts_like_the_undivided_group() -> None:
+    together, first, second = (agents_for(Chatter, rows) for rows in ([0, 1, 2, 3], [0, 3], [1, 2]))
+    sent = SentPackets.none()
+    for tick in range(5):
+        received = received_from(sent, [0, 1, 2, 3])
+        expected = step(together, tick, [0, 1, 2, 3], received)
+        parts = [step(second, tick, [1, 2], received), step(first, tick, [0, 3], received)]
+        assert plain(Actions.joined(parts)) == plain(expected)
+        sent = expected.sent
 
 
 def test_last_noted_state_in_a_tick_counts() -> None:
