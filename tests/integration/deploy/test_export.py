@@ -37,11 +37,7 @@ FIELDS = {
     "wifi-b-1M": ["ip.src", "ip.dst", "udp.length"],
     "argos-rab": ["frame.len"],
 }
-FIRST = {
-    "ieee802154": ["0xffff", "0"],
-    "wifi-b-1M": ["255.255.255.255", "14"],
-    "argos-rab": ["26"],
-}
+FIRST = {"ieee802154": ["0xffff", "0"], "wifi-b-1M": ["255.255.255.255", "14"], "argos-rab": ["26"]}
 FAULTS = [
     (["--at", "1"], "--at"),
     (["--kind", "delivery"], "--kind"),

@@ -125,12 +125,7 @@ CASES = {
         on_loss="wait",
         realtime=FACTOR,
         first=("a --robots 5", "b --robots 15"),
-        steps=(
-            (move(20), "SIGSTOP a"),
-            (move(15), ""),
-            (after("lost a", 5), "SIGCONT a"),
-            (ended("a"), "quit"),
-        ),
+        steps=((move(20), "SIGSTOP a"), (move(15), ""), (after("lost a", 5), "SIGCONT a"), (ended("a"), "quit")),
         changes="lost a",
         settings=(LONG, "run.watchdog_s=0.5", "run.runner_timeout_s=1"),
         counts={"runners_lost": 1},

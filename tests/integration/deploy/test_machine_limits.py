@@ -263,11 +263,5 @@ class Policies(Observer):
 @pytest.mark.parametrize(("realtime", "policy"), [(None, "SCHED_BATCH"), (2.0, "SCHED_OTHER")])
 def test_runners_take_turns_in_lockstep_and_start_at_once_in_real_time(realtime: float | None, policy: str) -> None:
     policies = Policies()
-    run(
-        EXAMPLES / "protocol" / "flock.toml",
-        overrides=SHORT_RUN,
-        runners=2,
-        realtime=realtime,
-        observers=[policies],
-    )
+    run(EXAMPLES / "protocol" / "flock.toml", overrides=SHORT_RUN, runners=2, realtime=realtime, observers=[policies])
     assert policies.numbers == [getattr(os, policy)] * 2

@@ -74,13 +74,7 @@ def test_loop_has_no_priority_in_lockstep():
 
 @needs_priority
 def test_loop_that_does_not_sleep_gives_up_its_priority(capsys: pytest.CaptureFixture[str]):
-    run(
-        LOSSY,
-        overrides=["duration_s=0.2"],
-        realtime=1.0,
-        subtick=0.001,
-        observers=[Endless()],
-    )
+    run(LOSSY, overrides=["duration_s=0.2"], realtime=1.0, subtick=0.001, observers=[Endless()])
     errors = capsys.readouterr().err
     assert "real time: the loop goes before other processes (SCHED_RR, priority 1)" in errors
     assert f"real time: the loop ran for {AWAKE_US / 1e6:g} s without a sleep, and no longer went" in errors

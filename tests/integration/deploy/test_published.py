@@ -208,10 +208,7 @@ def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path, mon
     with ExitStack() as held:
 
         def listen():
-            sides = {
-                "runners": open_runner(at),
-                "observers": open_observer(live(tmp_path).endpoint),
-            }
+            sides = {"runners": open_runner(at), "observers": open_observer(live(tmp_path).endpoint)}
             for side, session in sides.items():
                 held.enter_context(session)
                 received[side] = session.declare_subscriber("swarmwire/**", zenoh.handlers.RingChannel(500))

@@ -210,10 +210,7 @@ def test_fitted_radio_is_accepted_in_a_scenario(folder, monkeypatch, capsys, nam
     ("text", "reasons"),
     [
         (f"{HEAD}0,a,b,0,-50,1\n", ("path loss: needs 10 ", "losses: needs 100 ")),
-        (
-            rows(150, falling, lambda _: 2, lambda _: False),
-            ("got 0", "losses: .*150"),
-        ),
+        (rows(150, falling, lambda _: 2, lambda _: False), ("got 0", "losses: .*150")),
         (rows(50, lambda _: -60, lambda _: 2), ("path loss: .*distances", "losses: needs 100 ")),
         (rows(50, lambda _: -60, lambda i: 1 + i), ("path loss: RSSI", "losses: needs 100 ")),
     ],

@@ -38,18 +38,8 @@ SCENARIO: dict[str, Any] = {
     "time": {"rate_hz": 10},
     "arena": {"size_m": [4.0, 4.0], "boundary": "walls"},
     "robots": {
-        "flock": {
-            "body": "epuck",
-            "count": 4,
-            "place": {"how": "disc", "radius_m": 0.6},
-            "agent": spec("Chatter"),
-        },
-        "scouts": {
-            "body": "epuck",
-            "count": 2,
-            "place": {"how": "disc", "radius_m": 1.0},
-            "agent": spec("VectorEcho"),
-        },
+        "flock": {"body": "epuck", "count": 4, "place": {"how": "disc", "radius_m": 0.6}, "agent": spec("Chatter")},
+        "scouts": {"body": "epuck", "count": 2, "place": {"how": "disc", "radius_m": 1.0}, "agent": spec("VectorEcho")},
     },
     "radio": {
         "model": "unit-disk",

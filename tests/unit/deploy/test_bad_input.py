@@ -133,10 +133,7 @@ def test_files_that_are_no_scenario_are_named(tmp_path):
 
 @pytest.mark.parametrize(
     ("options", "name"),
-    [
-        *(({"runners": runners}, "runners") for runners in (0, 21, "many", True)),
-        ({"seeds": [1, 1]}, "seeds"),
-    ],
+    [*(({"runners": runners}, "runners") for runners in (0, 21, "many", True)), ({"seeds": [1, 1]}, "seeds")],
 )
 def test_option_that_cannot_be_is_refused_by_its_name(options, name):
     error = refused(LOSSY, **options)
@@ -192,7 +189,7 @@ OF_FILES = [  # an override by which something else in the file becomes wrong
         "radio.measures={}",
         "robots.flock.agent: Flocking needs 'radio.range', which the radio does not measure: "
         "[radio.measures] has nothing",
-    ),
+    )
 ]
 OF_COMMANDS = [
     ("run absent.toml", "absent.toml: expected a readable file: No such file or directory"),

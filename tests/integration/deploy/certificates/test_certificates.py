@@ -222,12 +222,7 @@ def test_expired_certificate_is_refused(opened: ExitStack, tmp_path: Path):
 def test_agents_with_their_certificates_receive_one_another_in_a_run(tmp_path):
     ca, out = tmp_path / "ca", tmp_path / "run"
     begin_authority(ca, WallClock())
-    issue(
-        ca,
-        [certificate_request(name, ("127.0.0.1",)) for name in ("tracker", *FLOCK)],
-        1,
-        WallClock(),
-    )
+    issue(ca, [certificate_request(name, ("127.0.0.1",)) for name in ("tracker", *FLOCK)], 1, WallClock())
     proof = {"ca": ca / "ca.pem", "certificate": ca / "tracker.pem", "key": ca / "tracker.key"}
     gateways = Gateways({"": "epuck2"}, network=Network(("tls/127.0.0.1:0",), **proof))
     bare = Recording(tables=False, rrd=False)

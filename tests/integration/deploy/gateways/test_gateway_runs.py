@@ -226,9 +226,7 @@ def test_few_are_named(scenario, scripted, capsys) -> None:
 
 
 def test_robot_that_dies_or_is_revived_comes_to_rest_undriven(scenario, scripted, capsys) -> None:
-    events = [
-        "events=[{at_s=0.2, do='kill', robots={group='other'}}, {at_s=0.6, do='revive', robots={group='other'}}]",
-    ]
+    events = ["events=[{at_s=0.2, do='kill', robots={group='other'}}, {at_s=0.6, do='revive', robots={group='other'}}]"]
     with Simulation(scenario, gateways={"other": "scripted"}, realtime=100, overrides=events) as simulation:
         for tick in (2, 6):  # as gateways tell it: with the first readings after
             simulation.run(tick)

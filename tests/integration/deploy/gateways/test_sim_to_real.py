@@ -57,12 +57,7 @@ def spread(behaviour: str, body: str) -> dict[str, FloatArray]:
 
 
 def through_gateway(
-    behaviour: str,
-    body: str,
-    folder: Path,
-    *,
-    broken: bool = False,
-    radio: str | None = None,
+    behaviour: str, body: str, folder: Path, *, broken: bool = False, radio: str | None = None
 ) -> tuple[dict[str, float], Result]:
     """What a run with its robots behind gateways comes to; tried once more at a lower pace if the machine lagged."""
     overrides = (*CASES[behaviour].overrides, f"seed={SEED}")
@@ -80,8 +75,7 @@ def through_gateway(
 
 
 @pytest.mark.parametrize(
-    ("behaviour", "body"),
-    [pytest.param(*case, marks=() if case in ALWAYS else pytest.mark.slow) for case in ALL],
+    ("behaviour", "body"), [pytest.param(*case, marks=() if case in ALWAYS else pytest.mark.slow) for case in ALL]
 )
 def test_agents_through_a_gateway_come_to_what_emulated_ones_do(behaviour, body, tmp_path) -> None:
     expected = spread(behaviour, body)

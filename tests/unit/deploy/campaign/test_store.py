@@ -142,10 +142,7 @@ CALLED = 'Traceback (most recent call last):\n  File "near.py", line 9, in step\
     ("error", "line"),
     [
         (f"the agent of a-0 failed:\n{CALLED}ValueError: too near\nin tick 5, at 0.5 s\n", "ValueError: too near"),
-        (
-            f"the agent of a-0 failed:\n{CALLED}AttributeError: go\nRobot has radio\nin tick 5\n",
-            "AttributeError: go",
-        ),
+        (f"the agent of a-0 failed:\n{CALLED}AttributeError: go\nRobot has radio\nin tick 5\n", "AttributeError: go"),
         (f"the metric east failed:\n{CALLED}KeyError: 'x'\n", "KeyError: 'x'"),
         ("robots.flock.place: no room for flock-7 with seed 3", "robots.flock.place: no room for flock-7 with seed 3"),
         ("the worker died\n", "the worker died"),

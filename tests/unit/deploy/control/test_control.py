@@ -13,15 +13,7 @@ from swarmwire.deploy.cli.actions.inject import robot_selection
 from swarmwire.deploy.cli.app import app
 from swarmwire.deploy.live.remote_control import Refused
 from swarmwire.deploy.runs import live_address
-from swarmwire.deploy.runs.live_address import (
-    Announcement,
-    Live,
-    LiveRun,
-    find_run,
-    live_runs,
-    runs_folder,
-    write_live,
-)
+from swarmwire.deploy.runs.live_address import Announcement, Live, LiveRun, find_run, live_runs, runs_folder, write_live
 from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from tests.support.clocks import until
 from tests.support.deploy.runs import at_tick, going
@@ -163,12 +155,7 @@ def test_live_event_takes_effect_next_tick_and_is_recorded_before(tmp_path):
         assert all(event["over"] for event in status["events"])
     assert lines(tmp_path / "run")[2:] == [{"tick": 6, "number": 1, "end": True}, {"tick": 6, "number": 0, "end": True}]
     events = [(event.tick, event.do, event.ended, event.at_s) for event in simulation.result.events]
-    assert events == [
-        (3, "kill", False, 0.3),
-        (5, "ramp", False, 0.5),
-        (6, "kill", True, 0.3),
-        (6, "ramp", True, 0.5),
-    ]
+    assert events == [(3, "kill", False, 0.3), (5, "ramp", False, 0.5), (6, "kill", True, 0.3), (6, "ramp", True, 0.5)]
     assert repeat(tmp_path / "run").same
 
 

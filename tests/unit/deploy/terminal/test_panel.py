@@ -180,8 +180,7 @@ def test_events_are_the_newest_three_and_name_a_few_robots():
 
 
 @pytest.mark.parametrize(
-    ("values", "expected"),
-    [([], ""), ([0.0, 0.5, 1.0], "▁▄▇"), ([-5.0, 7.0], "▁▇"), ([float("nan"), 1.0], " ▇")],
+    ("values", "expected"), [([], ""), ([0.0, 0.5, 1.0], "▁▄▇"), ([-5.0, 7.0], "▁▇"), ([float("nan"), 1.0], " ▇")]
 )
 def test_sparkline_has_a_character_per_value(values, expected):
     assert sparkline(values, 0.0, 1.0) == expected
