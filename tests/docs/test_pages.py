@@ -16,13 +16,16 @@ from typer.core import TyperGroup
 
 from swarmwire.agent.cli import _parser as agent_parser
 from swarmwire.deploy import run
+from swarmwire.deploy.campaigns import sweep
+from swarmwire.deploy.campaigns.tuning import run as tuning
 from swarmwire.deploy.cli.app import load_command
 from tests.docs.pages import PAGES, ROOT, Command, blocks_of, commands_of, files_of, first_not_printed
+from tests.support.deploy.campaign import InThisProcess
 from tests.support.deploy.runs import called
 
 WITH_COMMANDS = [page for page in PAGES if commands_of(page)]
 SHOWN = ("docs/getting-started.md", "docs/scenario.md", "docs/api/deploy.md")
-IN_THIS_PROCESS = re.compile(r"swarmwire (?!sweep|tune|test)[^|&;>*]*")  # workers need a main module
+IN_THIS_PROCESS = re.compile(r"swarmwire [^|&;>*]*")
 BY_ROOT = "$(command -v swarmwire)"  # behind sudo
 OURS = re.compile(r"\b(swarmwire(?:-agent)?) +(?=[a-z])(.*?)(?= && |$)")
 
@@ -35,6 +38,8 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("PATH", os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.chdir(tmp_path)
+    for campaigns in (sweep, tuning):  # each worker would load all libraries; test_smoke.py has real ones
+        monkeypatch.setattr(campaigns, "open_executor", lambda *_: InThisProcess())
     return tmp_path
 
 
