@@ -3,7 +3,6 @@
 import polars as pl
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.columns import failure_line
 from swarmwire.deploy.campaigns.store import CampaignWriter, StorageFailed
 from swarmwire.deploy.campaigns.worker import TaskResult
@@ -80,23 +79,6 @@ def test_retried_run_is_read_with_its_last_result(written):
     written.write(TaskResult((row(2, **{"order.final": 0.7}),)))
     again = CampaignFolder(written.path).sample("order", 1)
     assert (again.value.tolist(), again.failed) == ([0.7], 0)
-
-
-@pytest.mark.parametrize("damage", [pl.exceptions.ComputeError("cut off"), pl.exceptions.PanicException("cut off")])
-def test_damaged_table_of_a_resumed_campaign_is_named(written, monkeypatch, damage):
-    read, part = pl.read_parquet, written.path / "parts" / "part-00000001.parquet"
-
-    def damaged(file, **options):
-        if file == part:
-            raise damage
-        return read(file, **options)
-
-    monkeypatch.setattr(pl, "read_parquet", damaged)
-    for call in (written.rows, written.ended, written.clear, lambda: written.finish(1)):
-        with pytest.raises(BadInput) as refused:
-            call()
-        assert refused.value.where == str(part)
-        assert "--resume repeats its runs" in refused.value.expected
 
 
 @pytest.mark.parametrize("damage", [pl.exceptions.ComputeError("cut off"), pl.exceptions.PanicException("cut off")])

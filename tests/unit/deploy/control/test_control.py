@@ -62,19 +62,20 @@ def test_killed_runs_and_files_that_are_no_run_are_removed(tmp_path, runtime):
 
 
 def test_run_name_that_fits_none_or_several_runs_is_refused(tmp_path):
-    def refused_name(name: str | None, match: str) -> None:
-        with refused_input(match=match):
-            find_run(name)
-
-    refused_name(None, "none")
+    with refused_input(match="none"):
+        find_run(None)
     for name in ("aa1", "ab2"):
         announced(tmp_path / name, name)
-    refused_name(None, r"several.* aa1 \(.*\), ab2 \(")
-    refused_name("a", "several.* aa1 .*ab2")
     assert find_run("ab").run == "ab2"
-    refused_name("b", "aa1, ab2")
     (tmp_path / "empty").mkdir()
-    refused_name(str(tmp_path / "empty"), "empty: expected the folder of a live run")
+    for name, match in (
+        (None, r"several.* aa1 \(.*\), ab2 \("),
+        ("a", "several.* aa1 .*ab2"),
+        ("b", "aa1, ab2"),
+        (str(tmp_path / "empty"), "empty: expected the folder of a live run"),
+    ):
+        with refused_input(match=match):
+            find_run(name)
 
 
 def test_runtime_folder_open_to_others_or_linked_is_refused(tmp_path, runtime):
@@ -180,14 +181,6 @@ def test_refused_requests_get_one_line_and_leave_the_run_going(tmp_path, table, 
     assert simulation.result.live_events is None
 
 
-def test_stopped_run_has_a_summary(tmp_path):
-    with going(tmp_path / "run", "duration_s=1000") as (simulation, control):
-        control.step(2)
-        at_tick(control, 2)
-        control.stop()
-    assert (simulation.result.ended, simulation.result.ticks) == ("interrupted", 2)
-
-
 def ctl(*arguments: object) -> str:
     """What a command prints, in this process; an error of ours is raised as it is."""
     result = CliRunner().invoke(app, ["ctl", *map(str, arguments)], catch_exceptions=False)
@@ -242,13 +235,6 @@ def test_event_command_takes_any_event_table_of_a_scenario(going_run):
     [event] = control.status()["events"]
     assert event["text"] == 'fail part = "motors", robots = { count = 3 }, for_s = 10.0'
     assert tomllib.loads(f"event = {table}")["event"] == dict(simulation.live_events._waiting[0][1])
-
-
-@pytest.mark.parametrize(
-    "command", ["status", "pause", "step", "speed", "kill", "impulse", "partition", "jam", "set", "event"]
-)
-def test_help_of_each_ctl_command_has_an_example(command):
-    assert f"swarmwire ctl {command}" in ctl(command, "--help").replace("swarmwire ctl --run 3f2a", "swarmwire ctl")
 
 
 def test_robots_are_named_drawn_or_all():

@@ -50,6 +50,14 @@ def client(control, news):
         yield client
 
 
+@pytest.fixture
+def served(control, news):
+    """The address of the real server: at a port that the system chose, on loopback."""
+    server = serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock())
+    with server as address, contextlib.closing(news):
+        yield address
+
+
 @pytest.mark.parametrize("file", sorted(path.name for path in FILES.iterdir()))
 def test_files_of_the_page_are_served_under_the_token(client, file):
     answer = client.get(f"/secret/{file}")
@@ -65,12 +73,10 @@ def test_without_the_token_everything_is_refused(client, path):
     assert "token" in answer.text
 
 
-def test_request_without_a_path_is_refused(control, news):
-    with serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address:
-        connection = http.client.HTTPConnection(urlsplit(address).netloc, timeout=10)
-        with contextlib.closing(connection):
-            connection.request("OPTIONS", "*")
-            assert connection.getresponse().status == 403
+def test_request_without_a_path_is_refused(served):
+    with contextlib.closing(http.client.HTTPConnection(urlsplit(served).netloc, timeout=10)) as connection:
+        connection.request("OPTIONS", "*")
+        assert connection.getresponse().status == 403
 
 
 def test_page_address_without_its_last_slash_is_redirected(client):
@@ -215,25 +221,20 @@ def events(answer):
             yield name, json.loads(text.removeprefix("data: "))
 
 
-def test_news_reach_a_page_until_the_run_is_gone(control, news):
-    """Through the real server: at a port that the system chose, on loopback."""
-    with (
-        serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address,
-        contextlib.closing(news),
-    ):
-        assert address.startswith("http://127.0.0.1:")
-        news.start()
-        with urllib.request.urlopen(f"{address}news", timeout=20) as answer:
-            stream = events(answer)
-            name, facts = next(stream)
-            assert (name, facts["name"], facts["viewer"]) == ("facts", "a flock", SHOWN.viewer)
-            name, status = next(stream)
-            assert (name, status["state"]) == ("status", "running")
-            control.gone = True
-            over = next(status for _, status in stream if status["state"] == "over")
-            assert (over["tick"], over["gone"]) == (0, "nobody answers")
-    with pytest.raises(urllib.error.URLError):
-        urllib.request.urlopen(address, timeout=5)
+def test_news_reach_a_page_until_the_run_is_gone(control, news, served):
+    assert served.startswith("http://127.0.0.1:")
+    news.start()
+    with urllib.request.urlopen(f"{served}news", timeout=20) as answer:
+        stream = events(answer)
+        name, facts = next(stream)
+        assert (name, facts["name"], facts["viewer"]) == ("facts", "a flock", SHOWN.viewer)
+        name, status = next(stream)
+        assert (name, status["state"]) == ("status", "running")
+        control.gone = True
+        over = next(status for _, status in stream if status["state"] == "over")
+        assert (over["tick"], over["gone"]) == (0, "nobody answers")
+        assert news.readers == 1  # a page that is open is counted also after the end
+    until(lambda: news.readers == 0)
 
 
 def test_frozen_run_is_silent_until_it_answers_again(control):
@@ -263,15 +264,13 @@ def test_news_unread_by_a_page_are_dropped_but_the_newest(control, news):
     assert not news._readers
 
 
-def test_news_end_for_every_page_when_the_server_ends(control, news):
-    with serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address:
-        news.start()
-        answer = urllib.request.urlopen(f"{address}news", timeout=20)
+def test_news_end_for_every_page_when_the_server_ends(news, served):
+    news.start()
+    with urllib.request.urlopen(f"{served}news", timeout=20) as answer:
         stream = events(answer)
         assert [next(stream)[0], next(stream)[0]] == ["facts", "status"]
         news.close()
         assert [status for _, status in stream if status["state"] != "running"] == []  # it ends
-        answer.close()
 
 
 def test_departure_is_that_of_the_last_browser_after_there_was_one():
@@ -289,20 +288,6 @@ def test_departure_is_that_of_the_last_browser_after_there_was_one():
     assert looks(0, 1) == [False, False]  # a page that is loaded anew
     assert looks(1, 1000) == [False, False]
     assert looks(0, 6) == [False, True]
-
-
-def test_pages_that_are_open_are_counted_also_after_the_end(control, news):
-    with (
-        serving(lambda token, port: page_app(control, news, SHOWN, token, port), WallClock()) as address,
-        contextlib.closing(news),
-    ):
-        news.start()
-        with urllib.request.urlopen(f"{address}news", timeout=20) as answer:
-            control.gone = True
-            stream = events(answer)
-            next(status for _, status in stream if status.get("state") == "over")
-            assert news.readers == 1
-        until(lambda: news.readers == 0)
 
 
 def test_speed_is_unknown_while_kernels_are_compiled(control, news):
@@ -324,6 +309,8 @@ def test_token_differs_for_each_page():
             assert address == f"http://127.0.0.1:{port}/{token}/"
             assert len(token) >= 32
     assert calls[0][0] != calls[1][0]
+    with pytest.raises(urllib.error.URLError):  # the server ends with its block
+        urllib.request.urlopen(address, timeout=5)
 
 
 FOUR, NINE = static(robots=4), static(robots=9)

@@ -79,9 +79,8 @@ def messages(bag: Path) -> dict[str, list[tuple[int, Any]]]:
     """Times and messages by topic, as mcap-ros2-support decodes them."""
     by_topic: dict[str, list[tuple[int, Any]]] = {}
     with bag.open("rb") as file:
-        for _, channel, message, decoded in make_reader(
-            file, decoder_factories=[DecoderFactory()]
-        ).iter_decoded_messages(log_time_order=False):
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for _, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
             by_topic.setdefault(channel.topic, []).append((message.log_time, decoded))
     return by_topic
 
@@ -98,11 +97,8 @@ def yaw(turned: Any) -> float:
 def test_bag_has_the_poses_velocities_commands_and_notes_of_the_tables(recorded: tuple[RunFolder, Path]) -> None:
     folder, bag = recorded
     by_topic, names = messages(bag), ["flock_0", "flock_1", "flock_2"]
-    ticks, pose, velocity = (
-        folder.ticks(),
-        column(folder, "x_m", "y_m", "heading_rad"),
-        column(folder, "vx_mps", "vy_mps"),
-    )
+    pose, velocity = column(folder, "x_m", "y_m", "heading_rad"), column(folder, "vx_mps", "vy_mps")
+    ticks = folder.ticks()
     times = [round(time_s * 1e9) for time_s in ticks["time_s"]]
     assert len(times) == 15
     transforms = [message.transforms for _, message in by_topic["/tf"]]
@@ -115,10 +111,8 @@ def test_bag_has_the_poses_velocities_commands_and_notes_of_the_tables(recorded:
             assert (message.header.frame_id, message.child_frame_id) == ("map", f"{name}/base_link")
             assert (frame.header.frame_id, frame.child_frame_id) == ("map", f"{name}/base_link")
             heading = pose[tick, robot, 2]
-            for where, turned in (
-                (at.position, at.orientation),
-                (frame.transform.translation, frame.transform.rotation),
-            ):
+            turn = frame.transform
+            for where, turned in ((at.position, at.orientation), (turn.translation, turn.rotation)):
                 assert (where.x, where.y, where.z) == (*pose[tick, robot, :2], 0.0)
                 assert np.cos(yaw(turned) - heading) == pytest.approx(1.0)
             moved = message.twist.twist.linear  # turned back into the arena's frame

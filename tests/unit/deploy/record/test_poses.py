@@ -114,9 +114,7 @@ def test_poses_within_a_tick_decide_fates_also_in_a_repetition(tmp_path: Path) -
         loops.append(loop)
         results.append(fates)
     assert results[0].x_m == [FAR_M] * 4  # before each tick
-    assert results[0].fates[[Fate.RECEIVED, Fate.OUT_OF_RANGE]].tolist() == [
-        3,
-        6,
-    ]  # of three ticks; the fourth ends later
+    of_three_ticks = results[0].fates[[Fate.RECEIVED, Fate.OUT_OF_RANGE]].tolist()  # the fourth ends later
+    assert of_three_ticks == [3, 6]
     assert results[1].fates.tolist() == results[0].fates.tolist()
     assert loops[1].hexdigests() == loops[0].hexdigests()
