@@ -140,9 +140,8 @@ def playing(folder: Path, name: str) -> list[str]:
 def test_agent_may_print_and_one_that_raises_ends_the_run_with_a_traceback(tmp_path):
     ended = swarmwire("run", LOSSY, *playing(tmp_path, "Faulty"), "--out", tmp_path / "run", "--quiet")
     assert ended.returncode == 1
-    assert "the agent of flock-" in ended.stderr
-    assert 'raise ZeroDivisionError("the third step is too much")' in ended.stderr
-    assert "agents.py" in ended.stderr
+    for text in ("the agent of flock-", 'raise ZeroDivisionError("the third step is too much")', "agents.py"):
+        assert text in ended.stderr
     assert "hello from an agent" in ended.stdout + ended.stderr
 
 

@@ -79,34 +79,18 @@ def test_argos_experiment_becomes_these_tables(tmp_path):
     assert scenario["physics"] == {"engine": "pymunk"}
     arena = scenario["arena"]
     assert arena["size_m"] == [10.0, 8.06]  # the wall reaches to y = 8.03 - 4 m
+    turned = {"movable": True, "mass_kg": 2.5, "heading_rad": pytest.approx(-pi / 2)}
+    within = {"how": "box", "size_m": [4.0, 2.0], "at": [-3.0, -3.0]}
     assert arena["obstacles"] == [
         {"shape": "box", "size_m": [3.0, 0.1], "height_m": 0.5, "at": [0.0, 3.98]},
-        {
-            "shape": "box",
-            "size_m": [1.0, 0.5],
-            "height_m": 0.3,
-            "movable": True,
-            "mass_kg": 2.5,
-            "heading_rad": pytest.approx(-pi / 2),
-            "at": [-3.0, -2.0],
-        },
-        {
-            "shape": "cylinder",
-            "radius_m": 0.15,
-            "height_m": 0.5,
-            "count": 3,
-            "place": "random",
-            "within": {"how": "box", "size_m": [4.0, 2.0], "at": [-3.0, -3.0]},
-        },
+        {"shape": "box", "size_m": [1.0, 0.5], "height_m": 0.3, "at": [-3.0, -2.0], **turned},
+        {"shape": "cylinder", "radius_m": 0.15, "height_m": 0.5, "count": 3, "place": "random", "within": within},
     ]
     assert arena["lights"] == [{"intensity": 1.5, "at": [3.0, -3.0]}]
     params = {"velocity": 5.0, "eager": True, "state_name": "a:b", "state_class": 2.5}
     robots = scenario["robots"]
-    assert {group: (table["body"], table["count"]) for group, table in robots.items()} == {
-        "fb": ("footbot", 2),
-        "ep": ("epuck", 5),
-        "crowd": ("footbot", 4),
-    }
+    counts = {group: (table["body"], table["count"]) for group, table in robots.items()}
+    assert counts == {"fb": ("footbot", 2), "ep": ("epuck", 5), "crowd": ("footbot", 4)}
     assert all(table["agent"] == "mine.py:MyRule" and table["params"] == params for table in robots.values())
     assert robots["fb"]["place"]["poses"] == [[-4.0, -3.0, pytest.approx(pi)], [-4.0, -1.0, 0.0]]
     poses = [(1.5, 0.5), (1.0, 0.5), (0.5, 0.5), (1.5, -0.5), (1.0, -0.5)]
@@ -116,27 +100,16 @@ def test_argos_experiment_becomes_these_tables(tmp_path):
     assert robots["crowd"]["place"] == {"how": "box", "at": [0.0, 0.0]}
     sensors = {"positioning": {}, "proximity": {"noise": 0.1}}
     assert robots["fb"]["body_overrides"] == {"sensors": sensors}
-    assert scenario["radio"] == {
-        "preset": "argos-rab",
-        "range_m": 4.0,
-        "max_payload_bytes": 22,
-        "line_of_sight": False,
-        "bodies_block": False,
-        "loss": 0.25,
-        "measures": {"range": {"noise_m": 0.1}, "bearing": {}},
-    }
+    radio = {"preset": "argos-rab", "range_m": 4.0, "max_payload_bytes": 22, "loss": 0.25}
+    radio |= {"line_of_sight": False, "bodies_block": False, "measures": {"range": {"noise_m": 0.1}, "bearing": {}}}
+    assert scenario["radio"] == radio
 
 
 def test_argos_elements_without_a_counterpart_are_named(tmp_path):
     _, agents, notes = converted(tmp_path)
     named = [note.partition(": ")[0] for note in notes]
-    for element in (
-        "<footbot_gripper>",
-        "<footbot_turret_encoder>",
-        '<prism id="odd">',
-        "gaussian position",
-        "rab_range",
-    ):
+    elements = "<footbot_gripper>", "<footbot_turret_encoder>", '<prism id="odd">', "gaussian position", "rab_range"
+    for element in elements:
         assert any(name.startswith(element) for name in named), element
     assert "footbot_gripper" not in agents
     assert 'needs = ("proximity", "radio.range", "radio.bearing", "positioning", "compass")' in agents

@@ -166,20 +166,12 @@ def test_runners_that_join_leave_or_are_lost_change_a_run_as_stated(joiners, tmp
         for when, line in case.steps
     ]
     watcher, settings = Watcher(*steps), (*case.settings, f"run.on_runner_loss={case.on_loss}")
-    result = joiners.run(
-        *settings,
-        watcher=watcher,
-        start_with=case.start_with,
-        realtime=case.realtime,
-        subtick=case.subtick,
-        out=tmp_path / "run",
-    )
+    options = {"start_with": case.start_with, "realtime": case.realtime, "subtick": case.subtick}
+    result = joiners.run(*settings, watcher=watcher, out=tmp_path / "run", **options)
     assert not watcher.steps
     first = [f"joined {line.split()[0]}" for line in case.first]
-    assert [" ".join(change) for change in joiners.events] == [
-        *first,
-        *(case.changes.split(", ") if case.changes else []),
-    ]
+    changes = case.changes.split(", ") if case.changes else []
+    assert [" ".join(change) for change in joiners.events] == [*first, *changes]
     assert all(change.tick == -1 for change in result.runner_events[: len(first)])
     assert not case.reason or result.runner_events[len(first)].reason == case.reason
     assert result.ended == case.over

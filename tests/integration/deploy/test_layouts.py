@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.arrays import FloatArray
-from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import Truth
 from swarmwire.deploy import Recording, repeat, run
 from swarmwire.deploy.runs.simulation import Simulation
 from swarmwire.metrics.pictures.drawing.film import film_of
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from swarmwire.metrics.records.run_folder.verify import verify
+from tests.support.deploy.joiners import Watcher
 from tests.support.deploy.runs import LOSSY, PER_ROBOT, ROOT, run_spread
 
 PUSHER = """
@@ -132,16 +131,6 @@ def test_runs_with_movable_obstacles_are_the_same_in_every_layout(scenario: Path
     assert run(scenario, seeds=[5, 7]).trajectory_sha256[1:] == alone.trajectory_sha256
 
 
-class Values(Observer):
-    """Observer that keeps the numbers of all ticks."""
-
-    def __init__(self) -> None:
-        self.values: list[FloatArray | None] = []
-
-    def see(self, truth: Truth) -> None:
-        self.values.append(truth.value)
-
-
 @pytest.fixture
 def agents(tmp_path: Path) -> Path:
     (tmp_path / "agents.py").write_text(AGREEING)
@@ -152,10 +141,10 @@ def values(
     agents: Path, kind: str, runners: int | None, seeds: list[int], out: Path | None = None
 ) -> list[FloatArray | None]:
     """The numbers that agents of this kind note, by tick."""
-    observer = Values()
+    watcher = Watcher()
     setting = [f"robots.flock.agent={agents}:{kind}", "robots.flock.params={}", "duration_s=3"]
-    run_spread(LOSSY, runners, seeds=seeds, overrides=setting, observers=[observer], out=out, record=LEAN)
-    return observer.values
+    run_spread(LOSSY, runners, seeds=seeds, overrides=setting, observers=[watcher], out=out, record=LEAN)
+    return [truth.value for truth in watcher.truths]
 
 
 def as_bytes(ticks: list[FloatArray | None]) -> list[bytes | None]:
@@ -164,9 +153,8 @@ def as_bytes(ticks: list[FloatArray | None]) -> list[bytes | None]:
 
 @pytest.mark.parametrize(("kind", "runners"), [("Agreeing", PER_ROBOT), ("Turning", 3)])
 def test_noted_values_are_the_same_in_every_layout_bit_for_bit(agents: Path, kind: str, runners: int) -> None:
-    alone, spread, beside = (
-        values(agents, kind, where, seeds) for where, seeds in ((None, [2]), (runners, [2]), (None, [5, 2]))
-    )
+    layouts = (None, [2]), (runners, [2]), (None, [5, 2])
+    alone, spread, beside = (values(agents, kind, where, seeds) for where, seeds in layouts)
     assert as_bytes(spread) == as_bytes(alone)
     assert as_bytes([None if value is None else value[len(value) // 2 :] for value in beside]) == as_bytes(alone)
     assert alone[-1] is not None
@@ -178,10 +166,8 @@ def test_noted_values_are_recorded_from_the_first_on_and_repeated(agents: Path, 
     numbers = values(agents, "Turning", 2, [2, 3], folder)
     assert all(finding.good for finding in verify(folder)), verify(folder)
     table = RunFolder(folder).ticks(1)
-    expected = [
-        [None] * 20 if value is None else [None if np.isnan(one) else one for one in value[20:].tolist()]
-        for value in numbers
-    ]
+    arena = [np.full(20, np.nan) if value is None else value[20:] for value in numbers]
+    expected = [[None if np.isnan(one) else one for one in value.tolist()] for value in arena]
     assert table["value"].to_list() == expected
     assert numbers[0] is None
     assert repeat(folder, out=tmp_path / "again", record=LEAN).same

@@ -10,13 +10,12 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.arrays import BoolArray
-from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import Static, Truth
 from swarmwire.deploy import Recording, Result, RunFolder, Simulation
 from swarmwire.deploy.runs import backends
 from swarmwire.deploy.runs.result import ArenaResult
 from swarmwire.metrics.measures.registry import METRICS
 from tests.support.agent.hosts import PLAYERS
+from tests.support.deploy.joiners import Watcher
 from tests.support.world.locksteps import EncodedBackend
 
 TICKS = 24
@@ -166,12 +165,8 @@ def came_to(result: Result, seed: int) -> tuple[ArenaResult, list[tuple[Any, ...
     """All that is told of an arena but how it ended, and what happened in it."""
     at = [arena.seed for arena in result.arenas].index(seed)
     arena = result.arenas[at]
-    events = [event for event in result.events if event.tick < arena.ticks]
-    facts = [
-        (event.at_s, event.tick, event.do, event.part, event.ended, event.robots[at])
-        for event in events
-        if event.robots[at] or not event.singly
-    ]
+    events = [event for event in result.events if event.tick < arena.ticks and (event.robots[at] or not event.singly)]
+    facts = [(event.at_s, event.tick, event.do, event.part, event.ended, event.robots[at]) for event in events]
     return replace(arena, ended=""), facts
 
 
@@ -215,18 +210,8 @@ def test_arenas_leave_alike_through_frames(tmp_path: Path, monkeypatch: pytest.M
     assert encoded.counts == direct.counts
 
 
-class Looks(Observer):
-    """Keeps every truth."""
-
-    def begin(self, static: Static) -> None:
-        self.truths: list[Truth] = []
-
-    def see(self, truth: Truth) -> None:
-        self.truths.append(truth)
-
-
 def test_robots_of_an_arena_that_left_neither_live_move_nor_send(tmp_path: Path) -> None:
-    looks = Looks()
+    looks = Watcher()
     packed(scenario(tmp_path, "unit-disk"), SEEDS, observers=[looks])
     rows = slice(0, 7)  # of the first arena, which leaves after tick 5
     last = looks.truths[6]

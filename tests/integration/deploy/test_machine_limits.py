@@ -4,6 +4,7 @@ import ctypes
 import errno
 import json
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -156,9 +157,10 @@ def test_too_few_addresses_are_one_line_and_nothing_begins(tmp_path, limit_kb, e
 
 
 def test_summary_on_a_full_disk_costs_nobody_the_result(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(
-        folder, "write_text", lambda path, text: (refuses if path.name == SUMMARY else write_text)(path, text)
-    )
+    def write_others(path, text):
+        (refuses if path.name == SUMMARY else write_text)(path, text)
+
+    monkeypatch.setattr(folder, "write_text", write_others)
     code, out, errors = called(monkeypatch, capsys, "run", LOSSY, *SHORT, "--out", tmp_path / "run")
     assert code == 1
     assert_names(errors, tmp_path / "run" / "summary.json")
@@ -197,8 +199,7 @@ def test_open_files_too_few_for_all_runners_stop_a_run_before_it_begins(tmp_path
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=100, check=False)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    for text in ("error: this machine: ", f"at least {WORLD_FILES + 20} open files", "got 64 ", "ulimit -n"):
-        assert text in line
+    assert re.search(f"error: this machine: .*at least {WORLD_FILES + 20} open files.*got 64 .*ulimit -n", line)
     assert not (tmp_path / "run").exists()
 
 
@@ -213,9 +214,7 @@ def test_threads_too_few_for_all_runners_stop_a_run_before_it_begins(tmp_path, m
     monkeypatch.setattr("swarmwire.deploy.machine.start_new_thread", limited)
     code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--runners", "10", "--out", tmp_path / "run")
     assert code == 2
-    assert errors.startswith("error: this machine: ")
-    for text in ("for 10 runners", f"got {WORLD_THREADS} ", "ulimit -u"):
-        assert text in errors
+    assert re.search(f"error: this machine: .*for 10 runners.*got {WORLD_THREADS} .*ulimit -u", errors)
     assert not (tmp_path / "run").exists()
 
 
@@ -227,9 +226,8 @@ def test_threads_of_a_few_runners_and_no_billion_files_fit_a_machine():
 
 def heaps(first: str) -> int:
     """How many heaps a process has whose threads all took memory at the same time."""
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM.replace("SHARED", first)], capture_output=True, text=True, check=True, timeout=60
-    )
+    command = [sys.executable, "-c", PROGRAM.replace("SHARED", first)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     return done.stdout.count("<heap nr=")
 
 

@@ -16,9 +16,6 @@ import pytest
 from pymavlink import mavutil
 
 from swarmwire.agent import pose_feed
-from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.observe.interfaces import Observer
-from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.protocols.ros2.links import close, open_router
 from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import open_swarm
@@ -26,7 +23,8 @@ from swarmwire.deploy import repeat, run
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.comms.protocols.ros2 import independent
 from tests.support.comms.protocols.ros2.type_hashes import rihs01
-from tests.support.deploy.runs import ROOT, swarmwire
+from tests.support.deploy.runs import ROOT, At, swarmwire
+from tests.support.refusals import refused_input
 from tests.support.world.gateways import PROPER
 
 TRACED = ROOT / "scenarios" / "traced.toml"
@@ -134,14 +132,7 @@ def test_udp_poses_decide_who_is_in_range_and_the_run_repeats_without_them(tmp_p
     path = scenario(tmp_path, "udp", f'listen = "127.0.0.1:{port}"')
     sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
-    class Away(Event, Observer):
-        """Set from the middle of the run on."""
-
-        def see(self, truth: Truth) -> None:
-            if truth.tick == 40:
-                self.set()
-
-    away = Away()
+    away = Event()  # set from the middle of the run on
 
     def send(_: int) -> None:
         x_m = 8.0 if away.is_set() else 3.0  # the range is 5 m
@@ -151,7 +142,7 @@ def test_udp_poses_decide_who_is_in_range_and_the_run_repeats_without_them(tmp_p
         sender.sendto(b"{", ("127.0.0.1", port))
 
     with sender, sending(send):
-        result = run(path, realtime=1.0, subtick=subtick, out=tmp_path / "run", observers=[away])
+        result = run(path, realtime=1.0, subtick=subtick, out=tmp_path / "run", observers=[At(40, away.set)])
     assert result.radio is not None
     assert result.radio.fates["received"] > 20
     assert result.radio.fates["out_of_range"] > 10
@@ -262,29 +253,26 @@ class Feed:
 
 @pytest.mark.parametrize(("options", "key"), [({}, "source"), ({"realtime": 1.0, "seeds": 2}, "source")])
 def test_live_poses_need_real_time_and_one_seed(tmp_path, options, key):
-    with pytest.raises(BadInput) as error:
+    with refused_input(key=f"robots.row.motion.{key}"):
         run(scenario(tmp_path, "udp", 'listen = "127.0.0.1:0"'), **options)
-    assert error.value.key == f"robots.row.motion.{key}"
 
 
 def test_live_run_whose_poses_do_not_come_is_refused_before_its_first_tick(tmp_path):
     path = scenario(tmp_path, "udp", 'listen = "127.0.0.1:0", wait_s = 0.2')
-    with pytest.raises(BadInput, match="none yet of row-0, row-1"):
+    with refused_input(match="none yet of row-0, row-1"):
         run(path, realtime=1.0)
 
 
 @pytest.mark.parametrize("listen", ["nowhere", "127.0.0.1:99999", "192.0.2.1:9870"])
 def test_udp_address_that_cannot_be_used_is_refused(tmp_path, listen):
-    with pytest.raises(BadInput) as error:
+    with refused_input(key="robots.row.motion.listen"):
         run(scenario(tmp_path, "udp", f'listen = "{listen}"'), realtime=1.0)
-    assert error.value.key == "robots.row.motion.listen"
 
 
 def test_simulator_example_moves_ten_robots_apart(tmp_path):
     port = free_port(socket.SOCK_DGRAM)
-    simulator = subprocess.Popen(
-        [sys.executable, ROOT / "examples" / "motion" / "simulator.py", f"127.0.0.1:{port}", "100"]
-    )
+    program = ROOT / "examples" / "motion" / "simulator.py"
+    simulator = subprocess.Popen([sys.executable, program, f"127.0.0.1:{port}", "100"])
     try:
         overrides = ["duration_s=6", f'robots.row.motion.listen="127.0.0.1:{port}"']
         result = run(UDP, realtime=1.0, overrides=overrides, out=tmp_path / "run")
@@ -296,7 +284,6 @@ def test_simulator_example_moves_ten_robots_apart(tmp_path):
     ticks = RunFolder(tmp_path / "run").ticks()
     gap_m = np.diff(ticks["x_m"].to_numpy(), axis=1)
     assert gap_m[-1] == pytest.approx(gap_m[-1, 0], rel=1e-3)
-    assert (
-        gap_m[-1, 0] > gap_m[5, 0] + 3.0
-    )  # 60 m x (1 - cos(2 pi 6 / 40)) / 2 after 6 s: 12 m, less what the start took
+    # 60 m x (1 - cos(2 pi 6 / 40)) / 2 after 6 s: 12 m, less what the start took
+    assert gap_m[-1, 0] > gap_m[5, 0] + 3.0
     assert not ticks["z_m"].to_numpy().any()

@@ -59,11 +59,9 @@ def next_of(run) -> Any:
 
 def test_nobody_looks_on_and_nothing_is_encoded(tmp_path, monkeypatch, every_tick):
     monkeypatch.setattr(published, "encode_truth", None)  # to call it would be an error
-    observers = [metrics := Metrics(), shown := Published(tmp_path, "r", metrics, WallClock())]
-    lives = []
-    result = run(
-        LOSSY, overrides=["duration_s=2"], observers=[*observers, At(3, lambda: lives.append(read_live(tmp_path)))]
-    )
+    lives, look = [], At(3, lambda: lives.append(read_live(tmp_path)))
+    observers = [metrics := Metrics(), shown := Published(tmp_path, "r", metrics, WallClock()), look]
+    result = run(LOSSY, overrides=["duration_s=2"], observers=observers)
     assert (shown.frames, shown.left_out) == (0, 0)
     assert "observer_failed_Published" not in result.counts
     assert lives[0].pid == os.getpid()
@@ -87,10 +85,8 @@ def test_observer_gets_scene_ticks_and_metrics(tmp_path, every_tick):
                 assert got.truth.pose.tolist() == now.pose.tolist()
                 assert got.truth.edges is not None
                 assert got.truth.edges.tolist() == [[0, 3]]
-                assert all(
-                    np.array_equal(observed.latest[name], metrics.latest[name], equal_nan=True)
-                    for name in observed.latest
-                )
+                for name, values in observed.latest.items():
+                    assert np.array_equal(values, metrics.latest[name], equal_nan=True)
             observer.end(None)
             until(lambda: observed.next() or observed.over)
             assert observed.lost == observed.bad == 0
@@ -215,12 +211,8 @@ def test_runners_see_no_truth_and_observers_nothing_of_the_runners(tmp_path, mon
 
         # A subscriber to everything is one to the truth, so the run is published.
         result = run(LOSSY, overrides=["duration_s=4"], runners=2, observers=[metrics, shown, At(1, listen)])
-        keys = {
-            side: {str(sample.key_expr).split("/")[2] for sample in samples if sample}
-            for side, samples in {
-                side: [channel.try_recv() for _ in range(500)] for side, channel in received.items()
-            }.items()
-        }
+        samples = {side: filter(None, (channel.try_recv() for _ in range(500))) for side, channel in received.items()}
+        keys = {side: {str(sample.key_expr).split("/")[2] for sample in of_side} for side, of_side in samples.items()}
     assert result.ticks == 40
     assert keys == {"runners": {"frame", "answer"}, "observers": {"truth"}}
 

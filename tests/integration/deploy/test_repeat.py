@@ -17,7 +17,7 @@ import yaml
 from PIL import Image
 from typer.testing import CliRunner, Result
 
-from swarmwire.comms.base.errors import AgentFailed, BadInput
+from swarmwire.comms.base.errors import AgentFailed
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, ReceivedPackets
 from swarmwire.comms.robot.tick_io import Actions
@@ -36,6 +36,7 @@ from swarmwire.world.scenario_file import load_scenario
 from tests.integration.deploy.test_realtime import frames_of, runners_here
 from tests.support.deploy.joiners import Watcher, interrupt
 from tests.support.deploy.runs import LOSSY, ROOT
+from tests.support.refusals import refused_input
 from tests.support.world.locksteps import EncodedBackend
 
 SHORT = ["duration_s=2"]
@@ -146,29 +147,23 @@ def test_scenario_that_is_shipped_survives_python_and_being_written(tmp_path, sc
 def test_nav2_map_with_its_picture_and_buildings_are_copied(tmp_path, mine):
     (mine.parent / "maps").mkdir()
     Image.new("L", (80, 80), 254).save(mine.parent / "maps" / "hall.pgm")
-    keys = {"image": "hall.pgm", "resolution": 0.05, "origin": [-2, -2, 0], "negate": 0}
-    (mine.parent / "hall.yaml").write_text(
-        yaml.safe_dump({**keys, "image": "maps/hall.pgm", "occupied_thresh": 0.65, "free_thresh": 0.196})
-    )
+    keys = {"image": "maps/hall.pgm", "resolution": 0.05, "origin": [-2, -2, 0], "negate": 0}
+    (mine.parent / "hall.yaml").write_text(yaml.safe_dump({**keys, "occupied_thresh": 0.65, "free_thresh": 0.196}))
     (mine.parent / "yard.sdf").write_text(
         """<sdf version="1.9"><model name="m"><static>true</static><pose>1 1 0 0 0 0</pose><link name="l">
         <collision name="c"><geometry><box><size>0.5 0.5 1</size></box></geometry></collision></link></model></sdf>"""
     )
     run(mine, overrides=["arena.map=hall.yaml", "arena.buildings.file=yard.sdf"], out=tmp_path / "run")
     shutil.rmtree(mine.parent)
-    roles = copied(tmp_path / "run")
-    assert (roles["files/hall.yaml"], roles["files/hall.pgm"]) == ("map", "map")
-    assert roles["files/yard.sdf"] == "buildings"
+    roles = {"files/hall.yaml": "map", "files/hall.pgm": "map", "files/yard.sdf": "buildings"}
+    assert roles.items() <= copied(tmp_path / "run").items()
     assert repeat(tmp_path / "run").same
 
 
 def test_agent_files_are_copied_and_the_originals_are_not_needed(tmp_path, mine):
     run(mine, out=tmp_path / "run")
-    assert copied(tmp_path / "run") == {
-        "scenario.toml": "scenario",
-        "files/mine.py": "agent",
-        "files/mine-2.py": "agent",
-    }
+    roles = {"scenario.toml": "scenario", "files/mine.py": "agent", "files/mine-2.py": "agent"}
+    assert copied(tmp_path / "run") == roles
     assert (tmp_path / "run" / "files" / "mine-2.py").read_text() == (mine.parent / "other" / "mine.py").read_text()
     shutil.rmtree(mine.parent)
     moved = (tmp_path / "run").rename(tmp_path / "moved")
@@ -185,7 +180,7 @@ def test_agent_file_that_was_edited_is_named_and_the_run_differs(tmp_path, mine)
     assert (repetition.same, repetition.first_difference) == (False, 10)
     assert [change.split()[0] for change in repetition.changes] == ["files/mine.py"]
     path.unlink()
-    with pytest.raises(BadInput, match="mine.py"):
+    with refused_input(match="mine.py"):
         repeat(tmp_path / "run")
 
 
@@ -271,9 +266,8 @@ def test_agent_with_random_numbers_of_its_own_is_suspected(tmp_path, mine):
 def test_folder_without_a_run_is_refused_in_one_line(tmp_path, mine, spoil, expected):
     run(mine, out=tmp_path / "run")
     spoil(tmp_path / "run")
-    with pytest.raises(BadInput, match=expected) as caught:
+    with refused_input(match=expected):
         RepeatedRun(tmp_path / "run")
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(("logged", "recorded", "ticks"), [(True, False, 7), (True, True, 20), (False, False, 20)])
@@ -290,8 +284,7 @@ def test_killed_run_is_compared_as_far_as_it_came(tmp_path, mine, logged, record
     assert repetition.before is None
     assert repetition.compared == (7 if logged else 0)
     assert repetition.same is (True if logged else None)
-    assert repetition.why_not_all
-    assert "summary.json" in repetition.why_not_all
+    assert "summary.json" in (repetition.why_not_all or "")
 
 
 def test_run_that_an_agent_ended_is_repeated_to_its_end(tmp_path, mine):
@@ -366,9 +359,8 @@ def test_real_time_run_with_a_runner_frozen_for_a_while_is_repeated(tmp_path, ta
     assert repetition.result.radio == result.radio
     assert repetition.result.inputs == result.inputs
     assert repeat(tmp_path / "again").same
-    with pytest.raises(BadInput) as refused:
+    with refused_input("runners"):
         repeat(tmp_path / "run", runners=2)
-    assert refused.value.where == "runners"
 
 
 @pytest.mark.parametrize("realtime", [None, 10])
@@ -440,8 +432,7 @@ def test_record_that_is_truncated_is_repeated_as_far_as_it_is_whole(in_real_time
     (in_real_time / INPUTS).write_bytes(data[:-10])
     repetition = repeat(in_real_time)
     assert (repetition.before, repetition.compared, repetition.same) == (None, 9, True)
-    assert repetition.why_not_all
-    assert "9 of the run's 10" in repetition.why_not_all
+    assert "9 of the run's 10" in (repetition.why_not_all or "")
     assert [change.split()[0] for change in repetition.changes] == [INPUTS]
     (in_real_time / "summary.json").unlink()
     assert repeat(in_real_time).result.ticks == 9
@@ -451,14 +442,14 @@ def test_record_that_is_missing_or_damaged_is_refused(in_real_time):
     data = bytearray((in_real_time / INPUTS).read_bytes())
     data[10] ^= 0xFF
     (in_real_time / INPUTS).write_bytes(data)
-    with pytest.raises(BadInput, match="the actions of a tick"):
+    with refused_input(match="the actions of a tick"):
         repeat(in_real_time)
     scenario = in_real_time / "scenario.toml"
     data[10] ^= 0xFF
     (in_real_time / INPUTS).write_bytes(data)
     scenario.write_text(scenario.read_text().replace("count = 20", "count = 19"))
-    with pytest.raises(BadInput, match="rows: expected robots of 19"):
+    with refused_input(match="rows: expected robots of 19"):
         repeat(in_real_time)
     (in_real_time / INPUTS).unlink()
-    with pytest.raises(BadInput, match="external inputs"):
+    with refused_input(match="external inputs"):
         repeat(in_real_time)

@@ -142,13 +142,12 @@ def test_fit_of_a_missing_log_is_refused(tmp_path, monkeypatch, capsys):
 
 
 def test_fit_of_a_single_robots_table_is_possible(folders, monkeypatch, capsys):
-    code, out, errors = called(monkeypatch, capsys, "radio", "fit", folders[1] / "flock-0" / "received.csv")
+    log = folders[1] / "flock-0" / "received.csv"
+    code, out, errors = called(monkeypatch, capsys, "radio", "fit", log)
     assert (code, errors) == (0, "")
     assert "on 5 links" in out
     assert tomllib.loads(out[out.index("# Fitted to received.csv") :])["radio"]["loss"] == pytest.approx(0.3, abs=0.1)
-    code, _, errors = called(
-        monkeypatch, capsys, "radio", "fit", folders[1] / "flock-0" / "received.csv", "--within", "0.01"
-    )
+    code, _, errors = called(monkeypatch, capsys, "radio", "fit", log, "--within", "0.01")
     assert (code, errors.startswith("error: --within: "), "0.01 m" in errors) == (2, True, True)
 
 

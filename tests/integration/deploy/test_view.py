@@ -23,7 +23,7 @@ from swarmwire.deploy.runs.published import Published
 from swarmwire.metrics.measures.measure import Metrics
 from swarmwire.metrics.pictures.viewer.program import closed_environment, end, free_port, is_open, viewer_path
 from tests.support.clocks import until
-from tests.support.deploy.page import requested_hosts
+from tests.support.deploy.page import family, kill_family, requested_hosts
 from tests.support.deploy.runs import LOSSY, At, called
 
 rerun = pytest.importorskip("rerun", reason="needs the extra [view]")
@@ -56,21 +56,12 @@ def viewing(*arguments):
             assert match, line + process.stderr.read()
             yield process, match[0]
         finally:
-            for one in reversed([process, *family(process)]):
-                with contextlib.suppress(psutil.NoSuchProcess):
-                    one.kill()
-
-
-def family(process):
-    with contextlib.suppress(psutil.NoSuchProcess):
-        return psutil.Process(process.pid).children(recursive=True)
-    return []
+            kill_family(process.pid)
 
 
 def listening(pid):
     """The addresses at which a process and all its children listen."""
-    processes = [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
-    sockets = [c for one in processes for c in one.net_connections("inet") if c.status == psutil.CONN_LISTEN]
+    sockets = [c for one in family(pid) for c in one.net_connections("inet") if c.status == psutil.CONN_LISTEN]
     return [socket.laddr.ip for socket in sockets]
 
 
@@ -81,7 +72,7 @@ def test_recording_without_an_end_is_shown_on_loopback_until_ctrl_c(folder, tmp_
         head = b"RRF2"  # how rerun's recordings begin
         assert urllib.request.urlopen(f"{page}run.rrd", timeout=20).read()[:4] == head
         assert listening(process.pid) == ["127.0.0.1"]
-        assert not family(process)  # rerun has given its code, and ended
+        assert len(family(process.pid)) == 1  # rerun has given its code, and ended
         process.send_signal(signal.SIGINT)
         assert process.wait(30) == 0
 
@@ -111,9 +102,7 @@ def rerun_elsewhere():
             pid, host, port = parent.stdout.readline().split()
             yield parent, psutil.Process(int(pid)), host, int(port)
         finally:
-            for one in reversed([parent, *family(parent)]):
-                with contextlib.suppress(psutil.NoSuchProcess):
-                    one.kill()
+            kill_family(parent.pid)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux ends a child with its parent")
@@ -129,9 +118,8 @@ def test_rerun_ends_with_a_killed_parent_and_leaves_no_file(tmp_path, monkeypatc
 def test_rerun_listens_where_no_name_of_a_website_leads(monkeypatch):
     """Its port answers under any name, so a name that leads to 127.0.0.1 must not reach it."""
     with rerun_elsewhere() as (_, child, host, port):
-        assert {(c.laddr.ip, c.laddr.port) for c in child.net_connections("inet") if c.status == "LISTEN"} == {
-            (host, port)
-        }
+        listens = {(c.laddr.ip, c.laddr.port) for c in child.net_connections("inet") if c.status == "LISTEN"}
+        assert listens == {(host, port)}
         assert is_open(port, host)
         assert not is_open(port, "127.0.0.1")
 
@@ -168,6 +156,12 @@ def test_view_ends_with_its_window(folder, monkeypatch):
     assert not list(looks)
 
 
+def batches_in(path):
+    """The robots in a recording."""
+    chunks = rerun.chunk.RrdReader(str(path)).stream().filter(content="/world/robots")
+    return [chunk.to_record_batch() for chunk in chunks]
+
+
 def test_recording_without_an_end_is_completed_in_a_copy(folder, tmp_path):
     good = folder / "run.rrd"
     with readable(good) as path:
@@ -179,8 +173,7 @@ def test_recording_without_an_end_is_completed_in_a_copy(folder, tmp_path):
         assert path != cut
         verified = subprocess.run([viewer_path(), "rrd", "verify", path], capture_output=True, check=False)
         assert verified.returncode == 0, verified.stderr
-        ticks = [c.to_record_batch() for c in rerun.chunk.RrdReader(str(path)).stream().filter(content="/world/robots")]
-        assert sum(batch.num_rows for batch in ticks) > 10
+        assert sum(batch.num_rows for batch in batches_in(path)) > 10
     assert not path.exists()
     assert cut.stat().st_size == len(whole_bytes) * 2 // 3
 
@@ -220,19 +213,19 @@ def test_live_view_listens_on_loopback_and_its_death_leaves_the_run_alone(tmp_pa
 def test_live_view_ends_with_the_block_that_opened_it(tmp_path, monkeypatch, frozen):
     if frozen:
         monkeypatch.setattr(live_view, "EXIT_TIMEOUT_S", 0.2)
-    view, family = LiveView(tmp_path, web=True), []
+    view, processes = LiveView(tmp_path, web=True), []
 
     def look():
         until(lambda: listening(view.pid))
-        family.extend([psutil.Process(view.pid), *psutil.Process(view.pid).children(recursive=True)])
+        processes.extend(family(view.pid))
         if frozen:
-            for process in family:
+            for process in processes:
                 process.suspend()
 
     with view:
         live_run(tmp_path, view, At(5, look))
-    assert family
-    assert not [process for process in family if process.is_running() and process.status() != psutil.STATUS_ZOMBIE]
+    assert processes
+    assert not [process for process in processes if process.is_running() and process.status() != psutil.STATUS_ZOMBIE]
 
 
 def test_live_view_that_cannot_be_opened_says_so_and_the_run_goes_on(tmp_path, monkeypatch, capsys):
@@ -292,9 +285,7 @@ def test_published_run_is_drawn_in_the_viewer(tmp_path, viewer_for):
         live_run(tmp_path, Follow(1, follow), duration_s=20)
     rows = {}
     with readable(drawn) as path:
-        batches = [
-            c.to_record_batch() for c in rerun.chunk.RrdReader(str(path)).stream().filter(content="/world/robots")
-        ]
+        batches = batches_in(path)
     for batch in batches:
         if {"tick", "Points2D:positions"} <= set(batch.schema.names):
             rows.update(zip(batch["tick"].to_pylist(), batch["Points2D:positions"].to_pylist(), strict=True))

@@ -131,9 +131,7 @@ def plain() -> Result:
 
 def test_most_seekers_come_to_the_lamp(plain: Result):
     distance_m = plain.metrics["target_mean"]
-    assert distance_m.final is not None
-    assert distance_m.max is not None
-    assert distance_m.final < 0.5 * distance_m.max
+    assert (distance_m.final or np.inf) < 0.5 * (distance_m.max or 0.0)
 
 
 @pytest.mark.parametrize("way", ["state_machine", "behaviour_tree"])
@@ -173,8 +171,7 @@ def test_foreign_program_plays_as_an_agent_of_the_same_rule_does(tmp_path: Path)
     assert code == 0
     assert together.trajectory_sha256 == alone.trajectory_sha256
     assert together.radio is not None
-    assert alone.radio is not None
-    assert together.radio.fates == alone.radio.fates
+    assert together.radio == alone.radio
     assert together.radio.fates["received"] > 2000
 
 
@@ -183,9 +180,7 @@ def test_foreign_robots_and_those_of_swarmwire_hear_one_another(tmp_path: Path) 
     result, code = with_own(tmp_path, scenario())
     assert code == 0
     assert not {name for name in result.counts if name.endswith("_frames")}
-    order = result.metrics["order"].final
-    assert order is not None
-    assert order > 0.9
+    assert (result.metrics["order"].final or 0.0) > 0.9
 
 
 def test_foreign_program_needs_only_zenoh_and_msgpack_and_is_short() -> None:

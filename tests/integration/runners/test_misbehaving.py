@@ -136,18 +136,14 @@ def joiners(tmp_path) -> Iterator[Joiners]:
     started.close()
 
 
+Listened = tuple[Simulation, RemoteControl, list[str]]
+
+
 @contextmanager
-def listening(
-    folder: Path, joiners: Joiners, *overrides: str
-) -> Generator[tuple[Simulation, RemoteControl, list[str]]]:
+def listening(folder: Path, joiners: Joiners, *overrides: str) -> Generator[Listened]:
     """A run in a thread that listens for runners, its control, and the error that ended it."""
-    simulation = Simulation(
-        LOSSY,
-        overrides=[*joiners.overrides, *overrides],
-        out=folder,
-        listening=Listening(LOCALHOST, observer=joiners),
-        record=Recording(rrd=False, tables=False),
-    )
+    options = {"listening": Listening(LOCALHOST, observer=joiners), "record": Recording(rrd=False, tables=False)}
+    simulation = Simulation(LOSSY, overrides=[*joiners.overrides, *overrides], out=folder, **options)
     simulation.watch(Announcement(folder))
     errors: list[str] = []
 

@@ -36,9 +36,7 @@ def paged(scenario: Path, out: Path, *options: str) -> Generator[tuple["subproce
                 text += line
             yield process, match[1]
         finally:
-            for one in reversed(family(process.pid)):
-                with contextlib.suppress(psutil.NoSuchProcess):
-                    one.kill()
+            kill_family(process.pid)
 
 
 def family(pid: int) -> list[psutil.Process]:
@@ -46,6 +44,13 @@ def family(pid: int) -> list[psutil.Process]:
     with contextlib.suppress(psutil.NoSuchProcess):
         return [psutil.Process(pid), *psutil.Process(pid).children(recursive=True)]
     return []
+
+
+def kill_family(pid: int) -> None:
+    """Kill the process and all that it started."""
+    for process in reversed(family(pid)):
+        with contextlib.suppress(psutil.NoSuchProcess):
+            process.kill()
 
 
 @contextlib.contextmanager

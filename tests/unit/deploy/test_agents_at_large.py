@@ -61,11 +61,8 @@ class ToNobody(VectorAgent):
 @pytest.fixture
 def agent(tmp_path):
     (tmp_path / "at_large.py").write_text(AGENTS)
-    return lambda name: [
-        f"robots.flock.agent={tmp_path / 'at_large.py'}:{name}",
-        "robots.flock.params={}",
-        "duration_s=0.5",
-    ]
+    changes = "robots.flock.params={}", "duration_s=0.5"
+    return lambda name: [f"robots.flock.agent={tmp_path / 'at_large.py'}:{name}", *changes]
 
 
 @pytest.fixture(params=[False, True], ids=["directly", "encoded"])
@@ -120,19 +117,17 @@ def test_people_are_told_once_of_a_packet_that_is_too_large(agent, capfd):
     result = run(LOSSY, overrides=[*agent("Rambles"), "radio.max_payload_bytes=9"])
     assert result.radio is not None
     assert result.radio.fates["too_large"] > 19
-    lines = [line for line in capfd.readouterr().err.splitlines() if "too_large" in line]
-    assert len(lines) == 1
-    assert "10 bytes" in lines[0]
-    assert "radio.max_payload_bytes" in lines[0]
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if "too_large" in line]
+    assert "10 bytes" in line
+    assert "radio.max_payload_bytes" in line
 
 
 def test_battery_that_ends_is_reported_with_robots_and_time(capfd):
     battery = "{ battery = { capacity_wh = 1.0, idle_w = 3600.0, start = 0.5 } }"  # half a second
     one = ["robots.flock.count=2", f"robots.flock.body_overrides.sensors={battery}"]
     result = run(LOSSY, overrides=["duration_s=1.0", *one])
-    lines = [line for line in capfd.readouterr().err.splitlines() if "battery" in line]
-    assert len(lines) == 1
-    assert all(word in lines[0] for word in ("flock-0", "flock-1", "0.5 s"))
+    (line,) = [line for line in capfd.readouterr().err.splitlines() if "battery" in line]
+    assert all(word in line for word in ("flock-0", "flock-1", "0.5 s"))
     assert [(event["do"], event["at_s"]) for event in result.summary()["events"]] == [("run_down", 0.5)]
 
 
@@ -154,10 +149,8 @@ def played(monkeypatch, tmp_path):
 
                 patched.setattr(backends, "LocalBackend", made)
             result = run(LOSSY, overrides=overrides, observers=[watcher])
-        changes = [
-            f"{change.what} {change.runner} {change.tick}" for joiners in backend for change in joiners.roster.events
-        ]
-        return result, watcher, changes
+        events = [change for joiners in backend for change in joiners.roster.events]
+        return result, watcher, [f"{change.what} {change.runner} {change.tick}" for change in events]
 
     return play
 

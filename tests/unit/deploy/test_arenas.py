@@ -10,7 +10,6 @@ import polars as pl
 import pytest
 
 from swarmwire.comms.base.clock import NS_PER_S
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.robot.packets import Fate
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
 from swarmwire.deploy.runs.scenario_parts import read_link_traces
@@ -66,13 +65,8 @@ def without_a_wall(picture: str) -> str:
 @pytest.mark.parametrize(
     ("scenario", "files", "overrides", "change"),
     [
-        (
-            MAZE,
-            {"map": "maze.pgm", "ground": "floor.pgm"},
-            ["duration_s=2", "arena.ground.image='floor.pgm'"],
-            without_a_wall,
-        ),
-        (REPLAYED, {"trace": "replayed-links.csv"}, ["duration_s=3"], lambda _: f"{HEAD}\n0,{PAIR},1\n"),
+        (MAZE, {"map": "maze.pgm", "ground": "floor.pgm"}, ["arena.ground.image='floor.pgm'"], without_a_wall),
+        (REPLAYED, {"trace": "replayed-links.csv"}, [], lambda _: f"{HEAD}\n0,{PAIR},1\n"),
     ],
 )
 def test_run_with_files_is_repeated_from_its_folder_alone(tmp_path: Path, scenario, files, overrides, change):
@@ -83,7 +77,7 @@ def test_run_with_files_is_repeated_from_its_folder_alone(tmp_path: Path, scenar
     original = (scenario.parent / first).read_bytes()
     for name in files.values():
         (source / name).write_bytes(original)
-    result = run(source / scenario.name, overrides=overrides, seeds=[3, 4], out=folder)
+    result = run(source / scenario.name, overrides=["duration_s=2", *overrides], seeds=[3, 4], out=folder)
     shutil.rmtree(source)
     copies = {copied["what"]: copied for copied in json.loads((folder / "run.json").read_text())["files"]}
     digest = hashlib.sha256(original).hexdigest()
@@ -163,9 +157,8 @@ def test_shipped_links_are_cut_between_halves_when_the_file_says():
 
 def test_signals_have_the_strengths_of_the_file(tmp_path: Path):
     """Of one link; the others are out of range, although the robots stand side by side."""
-    pl.DataFrame(
-        {"t_s": [0.0, 1.0], "tx": ["flock-1"] * 2, "rx": ["flock-4"] * 2, "rssi_dbm": [-70, -80]}
-    ).write_parquet(tmp_path / "links.parquet")
+    links = {"t_s": [0.0, 1.0], "tx": ["flock-1"] * 2, "rx": ["flock-4"] * 2, "rssi_dbm": [-70, -80]}
+    pl.DataFrame(links).write_parquet(tmp_path / "links.parquet")
     shutil.copy(WALLED, tmp_path / "walled.toml")
     radio = ["radio.trace.file='links.parquet'", "radio.fading={distribution='rician', k=1e6}"]
     strengths: dict[bool, set[int]] = {False: set(), True: set()}
@@ -187,22 +180,20 @@ def test_links_of_a_scenario_made_in_python_are_kept_with_the_run(tmp_path: Path
     assert repeat(tmp_path / "run").same
 
 
-def lossy_with(tmp_path: Path, text: str, *settings: str) -> tuple[str, str]:
-    """Where and by which key the lossy flock with links of this text is refused."""
+@pytest.mark.parametrize(
+    ("text", "settings", "where", "key"),
+    [
+        (f"{HEAD}\n0,flock-0,flock-20,1\n", [], "links.csv", "row 1, rx"),
+        ("t_s,tx,rx,rssi_dbm\n0,flock-0,flock-1,-70\n", [], "links.csv", "rssi_dbm"),
+        (HEAD, ["radio.trace.file='nowhere.csv'"], "lossy.toml", "radio.trace.file"),
+        (HEAD, ["radio.trace.others='all'"], "--set radio.trace.others='all'", "radio.trace.others"),
+    ],
+)
+def test_links_that_cannot_be_replayed_are_refused_before_anything_runs(tmp_path: Path, text, settings, where, key):
     (tmp_path / "links.csv").write_text(text)
     shutil.copy(LOSSY, tmp_path / "lossy.toml")
-    with pytest.raises(BadInput) as error:
+    with refused_input(where if where.startswith("--set") else tmp_path / where, key):
         Simulation(tmp_path / "lossy.toml", overrides=["radio.trace.file='links.csv'", *settings])
-    return error.value.where.replace(f"{tmp_path}/", ""), error.value.key
-
-
-def test_links_that_cannot_be_replayed_are_refused_before_anything_runs(tmp_path: Path):
-    strange, strength = f"{HEAD}\n0,flock-0,flock-20,1\n", "t_s,tx,rx,rssi_dbm\n0,flock-0,flock-1,-70\n"
-    nowhere, others = "radio.trace.file='nowhere.csv'", "radio.trace.others='all'"
-    assert lossy_with(tmp_path, strange) == ("links.csv", "row 1, rx")
-    assert lossy_with(tmp_path, strength) == ("links.csv", "rssi_dbm")
-    assert lossy_with(tmp_path, HEAD, nowhere) == ("lossy.toml", "radio.trace.file")
-    assert lossy_with(tmp_path, HEAD, others) == (f"--set {others}", "radio.trace.others")
 
 
 ROBOTS = ("flock-0", "flock-1", "flock-2")
@@ -214,14 +205,10 @@ def test_csv_and_parquet_are_read_by_name(tmp_path):
     pl.read_csv(file).write_parquet(tmp_path / "trace.parquet")
     for path in (file, tmp_path / "trace.parquet"):
         traces = read_link_traces(path, ROBOTS)
-        assert traces.rssi_dbm is None
-        assert traces.delay_s is None
-        trace = traces.delivery_ratio
-        assert trace is not None
-        values = trace.values_at(
-            np.array([2, 2, 0]), np.array([0, 0, 2]), np.array([499_999_999, 500_000_000, 500_000_000])
-        )
-        assert values == pytest.approx([0.25, 1.0, np.nan], nan_ok=True)
+        assert traces.rssi_dbm is traces.delay_s is None
+        links = np.array([2, 2, 0]), np.array([0, 0, 2]), np.array([499_999_999, 500_000_000, 500_000_000])
+        assert traces.delivery_ratio is not None
+        assert traces.delivery_ratio.values_at(*links) == pytest.approx([0.25, 1.0, np.nan], nan_ok=True)
 
 
 def test_link_traces_have_the_values_of_their_rows_per_quantity(tmp_path):

@@ -1,7 +1,6 @@
 """Bad input is refused before anything starts: one line with file and key, exit code 2, no traceback."""
 
 from dataclasses import fields
-from pathlib import Path
 from typing import get_type_hints
 
 import pytest
@@ -80,22 +79,35 @@ def test_bad_value_is_refused_with_its_file_or_option_and_key(agents, setting, k
 
 
 @pytest.mark.parametrize(
-    ("command", "arguments"),
+    ("words", "where"),
     [
-        ("check", [LOSSY, "--set", "robots.flock.place.radius_m=0.1"]),
-        ("run", [LOSSY, "--set", "robots.flock.count=many"]),
-        ("run", [LOSSY, "--seeds", "9:1"]),
-        ("run", [LOSSY, "--runners", "all"]),
-        ("run", [LOSSY, "--realtime", "-2"]),
-        ("run", ["absent.toml"]),
-        ("check", [LOSSY, "--set", "nonsense"]),
+        (f"check {LOSSY} --set robots.flock.place.radius_m=0.1", f"{LOSSY}: robots.flock.place: "),
+        (f"check {LOSSY} --set nonsense", "--set nonsense: "),
+        (f"check {LOSSY} --set duration_s=inf", "--set duration_s=inf: duration_s: "),
+        (f"check {LOSSY} --set radio={{}}", "--set radio={}: radio.range_m: is missing"),
+        (f"check {LOSSY} --set radio.measures={{}}", f"{LOSSY}: robots.flock.agent: "),
+        (f"run {LOSSY} --set robots.flock.count=many", "--set robots.flock.count=many: robots.flock.count: "),
+        (f"run {LOSSY} --seeds 9:1", "--seeds: "),
+        (f"run {LOSSY} --runners all", "--runners: "),
+        (f"run {LOSSY} --realtime -2", "--realtime: "),
+        ("run absent.toml", "absent.toml: "),
+        (f"run {'x' * 300}", f"{'x' * 300}: "),
+        ("list nothing", "nothing: expected one of "),
+        ("describe flokking", "flokking: nothing has this name; nearest: Flocking"),
+        ("export absent --to film.gif", "absent: "),
+        ("certs issue absent a", "absent: expected a CA's folder: swarmwire certs init absent"),
+        ("certs issue ca a/b", "NAME: "),
+        ("radio probe unit-disk", "--contention: "),
+        ("ctl pause", "expected a live run: "),
     ],
 )
-def test_command_with_bad_input_prints_one_line_and_exits_with_2(command, arguments, tmp_path, monkeypatch, capsys):
+def test_command_with_bad_input_prints_one_line_and_exits_with_2(words, where, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    code, out, errors = called(monkeypatch, capsys, command, *arguments)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    begin_authority(tmp_path / "ca", DatedFakeClock("2026-06-01T12:00:00Z"))
+    code, out, errors = called(monkeypatch, capsys, *words.split())
     assert (code, out, errors.count("\n")) == (2, "", 1)
-    assert errors.startswith("error: ")
+    assert errors.startswith(f"error: {where}")
     assert not (tmp_path / "runs").exists()
 
 
@@ -169,74 +181,3 @@ def test_out_folder_that_is_not_empty_is_refused(tmp_path):
     for folder in (tmp_path, tmp_path / "kept" / "run"):
         error = refused(LOSSY, out=folder)
         assert (error.where, error.key) == ("out", str(folder))
-
-
-KINDS = (
-    "bodies, drives, body-keys, sensors, behaviours, fields, events, metrics, radio, presets, stages, fates, engines, "
-    "drivers, gateways, keys"
-)
-OF_SETTINGS = [
-    ("seed", "expected path=value, such as robots.flock.count=30"),
-    ("duration_s=inf", "duration_s: expected a number above 0 and at most 1000000000 (s), got inf"),
-    ("radio={}", "radio.range_m: is missing; expected a number above 0 (m): the unit disk requires a range"),
-    (
-        "events=[{at_s=1, do='kill', robots={group='flok'}}]",
-        "events.0.robots.group: expected one of flock (did you mean this?); got 'flok'",
-    ),
-]
-OF_FILES = [  # an override by which something else in the file becomes wrong
-    (
-        "radio.measures={}",
-        "robots.flock.agent: Flocking needs 'radio.range', which the radio does not measure: "
-        "[radio.measures] has nothing",
-    )
-]
-OF_COMMANDS = [
-    ("run absent.toml", "absent.toml: expected a readable file: No such file or directory"),
-    (f"run {'x' * 300}", f"{'x' * 300}: expected a readable file: File name too long"),
-    (f"run {LOSSY} --runners all", '--runners: expected "none", "per-robot" or 1 to 20 (the robots), got \'all\''),
-    ("list nothing", f"nothing: expected one of {KINDS}; swarmwire describe NAME describes one name"),
-    ("describe flokking", "flokking: nothing has this name; nearest: Flocking (swarmwire list names all)"),
-    ("export absent --to film.gif", "absent: expected a run folder: there is none"),
-    ("certs issue absent a", "absent: expected a CA's folder: swarmwire certs init absent"),
-    (
-        "certs issue ca a/b",
-        "NAME: expected 1 to 63 letters (a to z), digits, - and _ that start with a letter and do not end in -, "
-        "got 'a/b'",
-    ),
-    (
-        "radio probe unit-disk",
-        "--contention: expected nodes (2 or more), bytes and an interval of 0.001 to 1 s, such as 20,20,0.1",
-    ),
-    ("ctl pause", "expected a live run: this machine has none of yours"),
-]
-
-
-@pytest.fixture
-def error_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
-    """What a command prints that fails with exit code 2, in a folder with a CA."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    begin_authority(tmp_path / "ca", DatedFakeClock("2026-06-01T12:00:00Z"))
-
-    def call(*words: str) -> str:
-        code, out, errors = called(monkeypatch, capsys, *words)
-        assert (code, out) == (2, "")
-        return errors
-
-    return call
-
-
-@pytest.mark.parametrize(("setting", "line"), OF_SETTINGS)
-def test_bad_setting_is_refused_with_option_key_and_expectation(error_of, setting, line):
-    assert error_of("check", str(LOSSY), "--set", setting) == f"error: --set {setting}: {line}\n"
-
-
-@pytest.mark.parametrize(("setting", "line"), OF_FILES)
-def test_scenario_that_does_not_fit_a_setting_is_refused_by_its_file(error_of, setting, line):
-    assert error_of("check", str(LOSSY), "--set", setting) == f"error: {LOSSY}: {line}\n"
-
-
-@pytest.mark.parametrize(("words", "line"), OF_COMMANDS)
-def test_wrong_command_is_refused_with_what_to_type_instead(error_of, words, line):
-    assert error_of(*words.split()) == f"error: {line}\n"

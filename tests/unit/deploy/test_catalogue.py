@@ -122,23 +122,16 @@ def kinds_once(monkeypatch):
 def test_entry_is_found_by_name_and_printed_with_every_parameter(kind):
     entries = kind.entries()
     for entry in entries[:: 1 + len(entries) // 60]:  # of hundreds of keys, some
-        texts = {
-            repr(same) for same in (entry, find(f"{kind.singular}:{entry.name}"), find(f"{kind.name}:{entry.name}"))
-        }
-        assert len(texts) == 1  # not ==: a blank reading is NaN, which equals nothing
+        by_name = [find(f"{prefix}:{entry.name}") for prefix in (kind.singular, kind.name)]
+        assert {repr(same) for same in by_name} == {repr(entry)}  # not ==: a blank reading is NaN, which equals nothing
         assert entry.help.strip()
         assert "\n" not in entry.help
         text, narrow = printed(entry), printed(entry, width=80)
         assert entry.help in text
         assert max(map(len, narrow.splitlines())) <= 80
         for parameter in (parameter for table in entry.tables for parameter in table.parameters):
-            value = (
-                "required"
-                if parameter.required
-                else ""
-                if parameter.value is None
-                else json.dumps(parameter.value, ensure_ascii=False)
-            )
+            value = "" if parameter.value is None else json.dumps(parameter.value, ensure_ascii=False)
+            value = "required" if parameter.required else value
             assert_tells(text, [(parameter.name, value, parameter.unit, parameter.help)])
             assert f"\n{parameter.name} " in narrow
 
@@ -163,10 +156,8 @@ def test_behaviour_entry_shows_needs_and_parameters(name):
 def test_body_entry_shows_the_figures_of_its_sheet(name):
     body, text = load_body(name), printed(find(f"body:{name}"))
     assert all(part in text for part in (body.source, f"{body.radius_m}", f"{body.max_linear_mps:.4g} m/s"))
-    for title, sheet in [
-        ("drive", body.drive),
-        *((f"sensor: {sensor}", body.sensors[sensor]) for sensor in body.sensors),
-    ]:
+    sheets = {"drive": body.drive, **{f"sensor: {sensor}": body.sensors[sensor] for sensor in body.sensors}}
+    for title, sheet in sheets.items():
         plain = [field for field in fields(sheet) if not is_dataclass(getattr(sheet, field.name))]
         figures = [(field.name, bounds_of(field).unit, json.dumps(getattr(sheet, field.name))) for field in plain]
         assert_tells(text[text.index(f"\n{title}\n") :], figures)
@@ -248,16 +239,15 @@ def test_bodies_and_agents_of_a_user_are_described_as_shipped_ones(tmp_path, mon
     (tmp_path / "mine.toml").write_text('like = "epuck"\nmass_kg = 0.7\n[sensors.proximity]\nnoise = 0.25\n')
     (tmp_path / "my_agent.py").write_text(OWN)
     monkeypatch.chdir(tmp_path)
-    parameters = [
-        [value for table in find(name).tables for value in table.parameters] for name in ("mine.toml", "body:epuck")
-    ]
-    changed = [(now.name, now.value) for now, was in zip(*parameters, strict=True) if repr(now) != repr(was)]
+    mine, epuck = (
+        [row for table in find(name).tables for row in table.parameters] for name in ("mine.toml", "body:epuck")
+    )
+    changed = [(now.name, now.value) for now, was in zip(mine, epuck, strict=True) if repr(now) != repr(was)]
     assert changed == [("mass_kg", 0.7), ("noise", 0.25)]
     text = printed(find("my_agent.py:Mine"))
     assert "Turns on the spot.\n\nFor ever." in text
-    assert_tells(
-        text, [("turn_radps", "rad/s", "0.5", "how fast: # in all"), ("name", "required"), ("needs", "compass")]
-    )
+    needs = [("turn_radps", "rad/s", "0.5", "how fast: # in all"), ("name", "required"), ("needs", "compass")]
+    assert_tells(text, needs)
     text = printed(find(str(ROOT / "examples" / "gas" / "sniffer.toml")))
     gas, sealer = (text[text.index(f"\n{title}") :] for title in ("sensor: gas", "actuator: sealer"))
     assert_tells(gas, [("kind", "gas.py:Gas"), ("rate_hz", "5.0"), ("reach_m", "m", "1.0")])

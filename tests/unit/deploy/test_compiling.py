@@ -34,19 +34,10 @@ def test_compile_time_counts_kernels_within_kernels_once_and_only_while_entered(
 def status_of(clock: Clock, compiling: CompileTime) -> Status:
     metrics = Metrics([])
     metrics.begin(static(2))
-    return Status(
-        run_id="r",
-        scenario="s",
-        ticks=9,
-        metrics=metrics,
-        controls=Controls(clock, 10),
-        clock=clock,
-        health=lambda: None,
-        counts=dict,
-        radio=lambda: None,
-        events=list,
-        compiled_ns=compiling.total_ns,
-    )
+    names = {"run_id": "r", "scenario": "s", "ticks": 9}
+    told = {"health": lambda: None, "counts": dict, "radio": lambda: None, "events": list}
+    controls = Controls(clock, 10)
+    return Status(metrics=metrics, controls=controls, clock=clock, compiled_ns=compiling.total_ns, **names, **told)
 
 
 @pytest.mark.parametrize("tick", [0, 1, 2])

@@ -245,27 +245,25 @@ def handlers() -> list[object]:
     return [signal.getsignal(number) for number in ASKING]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_signal_requests_the_end_and_a_second_one_ends_at_once(number):
-    with Interrupt() as interrupt:
-        assert not interrupt.requested
-        signal.raise_signal(number)
-        assert (interrupt.requested, interrupt.hung_up) == (True, False)
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(number)
-
-
-def test_hang_up_requests_the_end_however_often_it_arrives():
-    with Interrupt() as interrupt:
-        for _ in range(3):
-            signal.raise_signal(signal.SIGHUP)
-        assert (interrupt.requested, interrupt.hung_up) == (True, True)
-
-
-def test_signal_handlers_are_restored_after_an_interrupt_block():
+@pytest.mark.parametrize(
+    ("numbers", "hung_up", "ends_at_once"),
+    [
+        ([signal.SIGINT], False, True),
+        ([signal.SIGTERM], False, True),
+        ([signal.SIGHUP] * 3, True, False),  # requests the end however often it arrives
+    ],
+)
+def test_signal_requests_the_end_and_a_second_one_ends_at_once_unless_it_is_a_hang_up(numbers, hung_up, ends_at_once):
     before = handlers()
-    with Interrupt():
+    with Interrupt() as interrupt:
         assert all(one != other for one, other in zip(handlers(), before, strict=True))
+        assert not interrupt.requested
+        for number in numbers:
+            signal.raise_signal(number)
+        assert (interrupt.requested, interrupt.hung_up) == (True, hung_up)
+        if ends_at_once:
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(numbers[0])
     assert handlers() == before
 
 
@@ -283,10 +281,10 @@ def test_hang_up_that_is_ignored_stays_ignored():
 
 
 def test_hang_up_before_the_first_tick_has_exit_code_129():
-    interrupt = Interrupt()
+    interrupt, message = Interrupt(), "interrupted while it waited for its runners"
     with pytest.raises(Interrupted), leaving_when_hung_up(interrupt):
-        raise Interrupted("interrupted while it waited for its runners")
+        raise Interrupted(message)
     interrupt.hung_up = True
     with pytest.raises(typer.Exit) as ended, leaving_when_hung_up(interrupt):
-        raise Interrupted("interrupted while it waited for its runners")
+        raise Interrupted(message)
     assert ended.value.exit_code == 129

@@ -15,7 +15,6 @@ from swarmwire.deploy.cli.actions.run import gateway_network, parse_gateways
 from swarmwire.deploy.robots.certificates.folder import begin_authority, issue, revoke
 from swarmwire.deploy.robots.certificates.register import certificate_request
 from swarmwire.deploy.runs.gateways.gateways import as_gateways
-from tests.support.world.gateways import ScriptedGateway
 
 
 def read(*texts: str, options: tuple[str, ...] = ()) -> Gateways:
@@ -104,8 +103,7 @@ def test_revoked_names_are_those_given_and_those_of_the_authority(tmp_path) -> N
 def test_python_takes_one_text_a_table_or_all_of_it() -> None:
     gateways = Gateways({"a": "ros2"})
     assert as_gateways("epuck2") == Gateways({"": "epuck2"})
-    assert as_gateways({"a": "ros2"}) == gateways
-    assert as_gateways(gateways) is gateways
+    assert as_gateways({"a": "ros2"}) == as_gateways(gateways) == gateways
     assert as_gateways(None) is None
 
 
@@ -164,13 +162,9 @@ def test_folder_is_not_made_if_the_network_address_is_taken(two_groups, scripted
     assert not any(gateway.is_open for gateway in scripted)
 
 
-def made(gateways: list[ScriptedGateway]) -> list[tuple[str, ...]]:
-    return [gateway.names for gateway in gateways]
-
-
 def test_gateway_gets_the_robot_names_of_the_run(two_groups, scripted) -> None:
     with Simulation(two_groups, gateways={"other": "scripted"}, realtime=100):
-        assert made(scripted) == [("other-0", "other-1", "other-2")]
+        assert [gateway.names for gateway in scripted] == [("other-0", "other-1", "other-2")]
 
 
 def test_network_without_certificates_is_warned_of_at_each_run(two_groups, scripted, capsys) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.base.threads import WORTH_ROWS
 from swarmwire.deploy import Result, Simulation, run
 from swarmwire.deploy.runs import backends
@@ -14,6 +13,7 @@ from swarmwire.world.scenario_file import load_scenario
 from tests.support.agent.hosts import PLAYERS
 from tests.support.deploy.joiners import Watcher
 from tests.support.deploy.runs import DISRUPTED, DISRUPTED_SHORT, LOSSY, PER_ROBOT, ROOT, run_spread
+from tests.support.refusals import refused_input
 from tests.support.world.locksteps import EncodedBackend
 
 SHORT = ["duration_s=1.5"]
@@ -62,16 +62,14 @@ def test_threads_do_not_change_the_run():
     robots, arenas = 50, 200
     assert robots * arenas >= WORTH_ROWS
     overrides = ["duration_s=0.3", f"robots.wanderers.count={robots}", "arena.size_m=[6.0,6.0]"]
-    one, two = (
-        run(ROOT / "scenarios" / "avoidance.toml", overrides=overrides, seeds=arenas, threads=threads)
-        for threads in (1, 2)
-    )
+    avoidance = ROOT / "scenarios" / "avoidance.toml"
+    one, two = (run(avoidance, overrides=overrides, seeds=arenas, threads=threads) for threads in (1, 2))
     assert one.trajectory_sha256 == two.trajectory_sha256
     assert len(set(one.trajectory_sha256)) == arenas
 
 
 def test_fewer_threads_than_one_are_refused():
-    with pytest.raises(BadInput, match="threads"):
+    with refused_input("threads"):
         run(LOSSY, threads=0)
 
 
@@ -305,7 +303,5 @@ def test_agent_needing_tx_status_is_refused_without_acknowledgements(tmp_path: P
     path = tmp_path / "refused.toml"
     before, after = INSISTING.split("[radio]")
     path.write_text(f"{before}\n[[events]]{after.split('[[events]]')[1]}")
-    with pytest.raises(BadInput) as caught:
+    with refused_input(path, "robots.often.agent", "'radio.tx_status'"):
         run(path, overrides=[f"radio={radio}"] if radio else [])
-    assert (caught.value.where, caught.value.key) == (str(path), "robots.often.agent")
-    assert "'radio.tx_status'" in caught.value.expected

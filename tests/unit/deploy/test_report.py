@@ -57,11 +57,7 @@ def test_report_of_a_run_lies_in_its_folder(report, tmp_path):
 
 @pytest.mark.parametrize(
     ("to", "says"),
-    [
-        ("report.pdf", ".html or .htm"),
-        ("nowhere/report.html", "nowhere/report.html: "),
-        ("taken/report.html", "figures: "),
-    ],
+    [("report.pdf", ".html"), ("nowhere/report.html", "report.html: "), ("taken/report.html", "figures: ")],
 )
 def test_report_that_cannot_be_written_is_refused_in_one_line(report, campaign, tmp_path, to, says):
     (tmp_path / "taken").mkdir()
@@ -91,9 +87,8 @@ def test_comparison_is_printed_and_written(monkeypatch, capsys, tmp_path, folder
     assert (code, errors) == (0, "")
     heading, *lines = out.splitlines()
     assert heading.split() == ["response", "at", "A", "B", "B", "-", "A", "interval", "delta", "p", "pairs"]
-    assert [line.split()[:2] for line in lines[:3]] == [
-        ["order.final", f"radio.loss={loss}"] for loss in ("0", "0.2", "0.4")
-    ]
+    at = [f"radio.loss={loss}" for loss in ("0", "0.2", "0.4")]
+    assert [line.split()[:2] for line in lines[:3]] == [["order.final", loss] for loss in at]
     assert f"written: {to}" in out
     points = (f"{folders[0]}@radio.loss={loss}" for loss in ("0", "0.4"))
     assert "A: radio.loss=0; B: radio.loss=0.4" in called(monkeypatch, capsys, "compare", *points)[1]
@@ -110,9 +105,8 @@ def test_compare_with_bad_arguments_prints_one_line_and_exits_with_2(monkeypatch
 
 def test_comparison_table_is_no_wider_than_the_terminal(folders):
     out = StringIO()
-    print_comparison(
-        compare(*(select(str(folder)) for folder in folders)), Console(file=out, force_terminal=True, width=100)
-    )
+    compared = compare(*(select(str(folder)) for folder in folders))
+    print_comparison(compared, Console(file=out, force_terminal=True, width=100))
     lines = out.getvalue().splitlines()
     assert all(len(Text.from_ansi(line).plain) <= 100 for line in lines)
     assert sum("order.final" in line for line in lines) == 1  # a response is named once

@@ -11,19 +11,21 @@ from types import SimpleNamespace
 import psutil
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import resume, sweep
 from swarmwire.deploy.campaigns import dask, schedule
 from swarmwire.deploy.campaigns import sweep as sweeping
 from swarmwire.deploy.campaigns.dask import ClusterFailed, DaskExecutor
 from swarmwire.deploy.campaigns.schedule import execute, tasks_of
 from swarmwire.deploy.campaigns.store import CampaignWriter
+from swarmwire.deploy.campaigns.sweep import NoObserver
 from swarmwire.deploy.cli.actions import sweep as sweep_action
 from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from tests.support.deploy.campaign import InThisProcess, children, cluster, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
+from tests.support.refusals import refused_input
 
 OPTIONS = {"seeds": 4, "vary": {"radio.loss": [0.0, 0.5]}, "batch": 2}
+SINGLE = {**OPTIONS, "batch": 1}
 LONG = ["duration_s=100000", "robots.pair.params.share=0.0"]
 ODD = """
 from swarmwire.deploy.runs.record import provenance
@@ -57,22 +59,20 @@ def one_worker(tmp_path_factory):
         yield opened
 
 
-class Observer:
-    """Looks on, and does something when the first task is done."""
+class Observer(NoObserver):
+    """Does something when the first task is done."""
 
-    def __init__(self, act=lambda: None):
-        self.act, self.tasks = act, 0
-
-    def begin(self, campaign, done, failed):
-        pass
+    def __init__(self, act):
+        self.acts = [act]
 
     def see(self, result):
-        self.tasks += 1
-        if self.tasks == 1:
-            self.act()
+        while self.acts:
+            self.acts.pop()()
 
-    def end(self):
-        pass
+
+def swept(reference, folder, cluster, **options):
+    """The campaign `c` in this folder, done by a cluster."""
+    return sweep(reference / "two.toml", out=folder / "c", executor=cluster.name, **options)
 
 
 def workers_of(folder):
@@ -85,8 +85,7 @@ def same(folder, reference):
 
 
 def test_dask_cluster_gives_the_rows_and_series_of_one_machine(tmp_path, reference, one_worker):
-    done = sweep(reference / "two.toml", out=tmp_path / "c", executor=one_worker.name, **OPTIONS)
-    assert done.is_over
+    assert swept(reference, tmp_path, one_worker, **OPTIONS).is_over
     same(tmp_path / "c", reference)
     (worker,) = workers_of(tmp_path / "c")
     assert worker.startswith("tcp://127.0.0.1:")
@@ -95,8 +94,7 @@ def test_dask_cluster_gives_the_rows_and_series_of_one_machine(tmp_path, referen
 
 
 def test_agent_that_kills_its_process_costs_its_run_alone(tmp_path, reference, one_worker):
-    kill = ['robots.pair.params.how="kill"']
-    sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, batch=2, overrides=kill)
+    swept(reference, tmp_path, one_worker, seeds=2, batch=2, overrides=['robots.pair.params.how="kill"'])
     assert [row["error"] for row in rows_in(tmp_path / "c")] == [None, "the worker died"]
     assert one_worker.nannies[0].is_running()
 
@@ -104,11 +102,11 @@ def test_agent_that_kills_its_process_costs_its_run_alone(tmp_path, reference, o
 def test_ctrl_c_ends_what_is_under_way_on_the_workers(tmp_path, reference, one_worker, monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr(sweeping, "execute", interrupted_once_at_work(one_worker.nannies[0]))
-        done = sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, overrides=LONG)
+        done = swept(reference, tmp_path / "first", one_worker, seeds=2, overrides=LONG)
     assert (done.done, done.is_over) == (0, False)
     # The worker does one task at a time: another campaign ends only if the run of 100,000 s is no more.
-    assert sweep(reference / "two.toml", out=tmp_path / "next", executor=one_worker.name, **OPTIONS).is_over
-    same(tmp_path / "next", reference)
+    assert swept(reference, tmp_path, one_worker, **OPTIONS).is_over
+    same(tmp_path / "c", reference)
 
 
 def interrupted_once_at_work(nanny):
@@ -139,11 +137,7 @@ def test_worker_that_is_killed_in_the_middle_costs_no_run(tmp_path, reference):
             processes.extend(children(opened.nannies[0]))
             opened.nannies[0].kill()
 
-        done = sweep(
-            reference / "two.toml", out=tmp_path / "c", executor=opened.name, observer=Observer(kill_it),
-            **{**OPTIONS, "batch": 1},
-        )  # fmt: skip
-        assert done.is_over
+        assert swept(reference, tmp_path, opened, observer=Observer(kill_it), **SINGLE).is_over
         assert len(workers_of(tmp_path / "c")) == 2
         assert psutil.wait_procs(processes, timeout=30)[1] == []
     same(tmp_path / "c", reference)
@@ -158,11 +152,7 @@ def test_worker_that_is_frozen_is_given_up_and_costs_no_run(tmp_path, reference)
             for child in children(opened.nannies[0]):
                 child.suspend()
 
-        done = sweep(
-            reference / "two.toml", out=tmp_path / "c", executor=opened.name, observer=Observer(freeze_it),
-            **{**OPTIONS, "batch": 1},
-        )  # fmt: skip
-        assert done.is_over
+        assert swept(reference, tmp_path, opened, observer=Observer(freeze_it), **SINGLE).is_over
         assert len(workers_of(tmp_path / "c")) == 2
     same(tmp_path / "c", reference)
 
@@ -172,8 +162,7 @@ def test_run_that_stands_still_ends_its_worker_and_is_a_failed_row(tmp_path, ref
     (reference / "hanging.py").write_text(HANGING)
     with cluster(tmp_path, 0, DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="0") as opened:
         opened.add_worker(preload=tmp_path / "short.py")
-        agent = ['robots.pair.agent="hanging.py:Hanging"']
-        done = sweep(reference / "two.toml", seeds=1, out=tmp_path / "c", executor=opened.name, overrides=agent)
+        done = swept(reference, tmp_path, opened, seeds=1, overrides=['robots.pair.agent="hanging.py:Hanging"'])
     assert (done.is_over, done.failed) == (True, 1)
     assert rows_in(tmp_path / "c")[0]["error"] == "the worker died"
 
@@ -184,11 +173,9 @@ def test_scheduler_that_is_killed_is_one_line_and_the_sweep_resumes_here(
     folder = tmp_path / "c"
     with cluster(tmp_path, 1) as opened:
         monkeypatch.setattr(sweep_action, "SweepProgress", lambda _: Observer(opened.scheduler.kill))
-        vary, batch = ("--vary", "radio.loss=0.0,0.5"), ("--batch", "1")
-        code, _, errors = called(
-            monkeypatch, capsys, "sweep", reference / "two.toml", *vary, "--seeds", "4", *batch, "--out", folder,
-            "--executor", opened.name,
-        )  # fmt: skip
+        options = ["--vary", "radio.loss=0.0,0.5", "--seeds", "4", "--batch", "1", "--executor"]
+        command = ("sweep", reference / "two.toml", "--out", folder, *options, opened.name)
+        code, _, errors = called(monkeypatch, capsys, *command)
     assert (code, caplog.text) == (1, "")
     pattern = f"error: {opened.name}: .*--resume {folder}.*--executor local"
     assert [line for line in errors.splitlines() if "waiting" not in line] == [errors.splitlines()[-1]]
@@ -209,7 +196,7 @@ def test_scheduler_that_is_frozen_is_given_up_in_a_line(tmp_path, reference, one
     monkeypatch.setattr(sweeping, "execute", lambda *arguments: [frozen(), schedule.execute(*arguments)][1])
     try:
         with pytest.raises(ClusterFailed, match="--resume"):
-            sweep(reference / "two.toml", seeds=2, out=tmp_path / "c", executor=one_worker.name, overrides=LONG)
+            swept(reference, tmp_path, one_worker, seeds=2, overrides=LONG)
     finally:
         one_worker.scheduler.resume()
 
@@ -220,12 +207,10 @@ def test_without_workers_or_with_one_of_another_version_nothing_begins(tmp_path,
     with cluster(tmp_path, 0) as opened:
         with pytest.raises(ClusterFailed, match=rf"^{opened.name}: .*0\.1 s"):
             DaskExecutor(opened.name, None, Path(), report=lines.append, no_worker_s=0.1)
-        assert len(lines) == 1
-        assert lines[0].startswith(f"{opened.name}: ")
+        assert [line.startswith(f"{opened.name}: ") for line in lines] == [True]
         opened.add_worker(preload=tmp_path / "odd.py")
-        with pytest.raises(BadInput, match=r"numpy.* 1\.0") as refused:
-            sweep(reference / "two.toml", seeds=1, out=tmp_path / "c", executor=opened.name)
-        assert refused.value.where == "executor"
+        with refused_input("executor", match=r"numpy.* 1\.0"):
+            swept(reference, tmp_path, opened, seeds=1)
         assert not (tmp_path / "c").exists()
 
 
@@ -260,9 +245,8 @@ def test_worker_takes_the_functions_that_this_machine_has_compiled(tmp_path, mon
     async def set_resources(**resources: int) -> None:
         assert resources == {"campaign": 1}
 
-    worker = SimpleNamespace(
-        address="", local_directory=tmp_path, log_event=lambda *_: None, set_resources=set_resources, status=None
-    )
+    names = {"address": "", "local_directory": tmp_path, "log_event": lambda *_: None, "status": None}
+    worker = SimpleNamespace(set_resources=set_resources, **names)
     asyncio.run(dask.Preparation("campaign", dask.environment(), {dask.KERNELS: b"compiled"}).setup(worker))
     assert archives == [b"compiled"]
 

@@ -3,10 +3,10 @@
 import polars as pl
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import RunFolder, resume, sweep
 from swarmwire.deploy.campaigns.repetition import CampaignRun
 from tests.support.deploy.interfaces import DISK, STILL, line, needs_interfaces, with_program
+from tests.support.refusals import refused_input
 
 SAY = "import os, sys\nprint(os.environ['ROBOT'], *sys.argv[1:], flush=True)\nimport time\ntime.sleep(60)\n"
 
@@ -33,7 +33,7 @@ def test_realtime_campaign_runs_the_robots_programs_from_copies_of_their_files(s
         folder = tmp_path / f"c/runs/run-{run:06d}"
         assert (folder / "programs/line-1.log").read_text() == "line-1 hello\n"
         assert (RunFolder(folder).summary or {})["mode"] == "realtime"
-    with pytest.raises(BadInput, match="realtime"):
+    with refused_input(match="realtime"):
         CampaignRun(tmp_path / "c", 0)
 
 
@@ -64,6 +64,5 @@ def test_realtime_run_that_is_late_fails_and_can_be_retried(scenario, tmp_path):
 def test_realtime_campaign_refuses_settings_that_contradict_it(scenario, tmp_path, settings, key):
     plain = scenario.parent / "lone.toml"
     plain.write_text(line(1) + DISK)
-    with pytest.raises(BadInput) as refused:
+    with refused_input(key):
         sweep(plain, seeds=1, out=tmp_path / "c", **settings)
-    assert refused.value.where == key

@@ -1,7 +1,9 @@
 """A campaign that was ended is resumed; one with damaged files is refused or mended."""
 
 import errno
+import hashlib
 import json
+import re
 from shutil import copytree
 
 import polars as pl
@@ -20,6 +22,7 @@ from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.metrics.recorded import damaged
+from tests.support.refusals import refused_input
 
 VARY = {"radio.loss": [0.0, 0.5]}
 OPTIONS = {"seeds": 2, "vary": VARY, "batch": 2}
@@ -98,7 +101,7 @@ def test_failed_runs_stay_unless_they_are_to_be_tried_again(tmp_path, campaign):
     agent = campaign / "scenario" / "files" / "stumbling.py"
     spec = read_campaign(campaign)
     agent.write_text(agent.read_text().replace("< self.share", "< 0.0"))
-    with pytest.raises(BadInput, match="scenario/files/stumbling.py"):
+    with refused_input(match="scenario/files/stumbling.py"):
         resume(campaign, retry_failed=True)
     _say_as_it_is_now(campaign, agent)
     done = resume(campaign, retry_failed=True)
@@ -111,8 +114,6 @@ def test_failed_runs_stay_unless_they_are_to_be_tried_again(tmp_path, campaign):
 
 
 def _say_as_it_is_now(folder, agent):
-    import hashlib
-
     about = json.loads((folder / "campaign.json").read_text())
     for file in about["files"]:
         if file["path"].endswith(agent.name):
@@ -124,25 +125,27 @@ def test_other_code_and_versions_are_refused_unless_people_insist(campaign):
     about = json.loads((campaign / "campaign.json").read_text())
     for key, value, text in (
         ("modules", {**about["modules"], "swarmwire.world": "0"}, "swarmwire.world"),
+        ("modules", {**about["modules"], "gone_away": "0"}, "gone_away"),  # a package that is no longer installed
         ("versions", {**about["versions"], "numpy": "1.0"}, r"numpy.* 1\.0"),
     ):
         (campaign / "campaign.json").write_text(json.dumps({**about, key: value}))
-        with pytest.raises(BadInput, match=f"^--resume {campaign}: .*{text}.*--force"):
+        with refused_input(f"--resume {campaign}", match=f"{text}.*--force"):
             resume(campaign)
         assert resume(campaign, force=True).is_over
+        (change,) = CampaignRun(campaign, 0).run().changes
+        assert re.search(text, change)
 
 
 @pytest.mark.parametrize("text", [None, "{", "[]", '{"format": 1}', '{"format": 2}'])
 def test_folder_without_a_campaign_is_refused_in_a_line(tmp_path, text):
     if text is not None:
         (tmp_path / "campaign.json").write_text(text)
-    with pytest.raises(BadInput, match=f"^{tmp_path}.*expected ") as refused:
+    with refused_input(match=f"^{tmp_path}"):
         resume(tmp_path)
-    assert "\n" not in str(refused.value)
 
 
 def test_campaign_folder_is_for_one_process_at_a_time(campaign):
-    with folder_lock(campaign, "campaign"), pytest.raises(BadInput, match="another process is at work"):
+    with folder_lock(campaign, "campaign"), refused_input(match="another process is at work"):
         resume(campaign)
 
 
@@ -152,9 +155,7 @@ def test_full_disk_loses_no_finished_runs_of_a_sweep(tmp_path, scenario, executo
         dying_at(patched, count, FULL)
         with pytest.raises(StorageFailed) as error:
             sweep(scenario, out=folder, **OPTIONS)
-    assert str(error.value).startswith(f"{folder}: ")
-    assert "No space left on device" in str(error.value)
-    assert str(error.value).endswith(f"swarmwire sweep --resume {folder}")
+    assert re.match(f"{folder}: .*No space left on device.*swarmwire sweep --resume {folder}$", str(error.value))
     assert len(rows_in(folder)) == 2 * (count // 2)
     assert executors[0].closed
     assert resume(folder).is_over
@@ -162,8 +163,6 @@ def test_full_disk_loses_no_finished_runs_of_a_sweep(tmp_path, scenario, executo
 
 
 def test_series_that_cannot_be_joined_are_no_loss_either(tmp_path, scenario, executors, monkeypatch):
-    import polars as pl
-
     sink = pl.LazyFrame.sink_parquet
 
     def full(frame, path, **options):
@@ -209,19 +208,6 @@ def half(sound, tmp_path, executors):
     return copytree(sound / "half", tmp_path / "half")
 
 
-def refused(call, *arguments):
-    with pytest.raises(BadInput) as error:
-        call(*arguments)
-    assert "\n" not in str(error.value)
-    assert error.value.expected
-    return error.value
-
-
-def at(error):
-    """The file and the key that an error names."""
-    return error.where, error.key
-
-
 def taken_up(folder):
     """What `resume` reads and joins before and after it runs what is missing."""
     its = store.CampaignWriter(folder, read_campaign(folder))
@@ -257,7 +243,8 @@ def test_damaged_part_is_named_and_its_runs_run_again_without_it(half, untouched
     part = half / "parts" / "part-00000001.parquet"
     part.write_bytes(data)
     for call in (resume, lambda folder: CampaignRun(folder, 1).run()):
-        assert refused(call, half).where == str(part)
+        with refused_input(part):
+            call(half)
     part.unlink()
     assert resume(half).is_over
     assert rows_in(half) == rows_in(untouched)
@@ -267,7 +254,8 @@ def test_damaged_part_is_named_and_its_runs_run_again_without_it(half, untouched
 def test_damaged_series_is_named_and_the_table_is_whole_without_it(half, untouched):
     part = next((half / "series").glob("part-*"))
     part.write_bytes(b"")
-    assert refused(resume, half).where == str(part)
+    with refused_input(part):
+        resume(half)
     part.unlink()
     assert resume(half).is_over
     assert rows_in(half) == rows_in(untouched)
@@ -277,7 +265,8 @@ def test_series_of_another_type_are_told_by_file_and_column(half):
     first, second = sorted((half / "series").glob("part-*"))
     pl.read_parquet(second).with_columns(pl.col("order").cast(pl.String)).write_parquet(second)
     its = store.CampaignWriter(half, read_campaign(half))
-    assert at(refused(its.finish, 1)) == (str(second), "order")
+    with refused_input(second, "order"):
+        its.finish(1)
     assert first.exists()
 
 
@@ -290,9 +279,8 @@ def test_table_of_another_campaign_is_refused_with_file_and_column(half):
         (rows.with_columns(run=pl.col("run") + 8), "run", "0 to 3"),
     ):
         frame.write_parquet(part)
-        error = refused(resume, half)
-        assert at(error) == (str(part), column)
-        assert expected in error.expected
+        with refused_input(part, column, expected):
+            resume(half)
 
 
 def test_files_of_others_in_the_folder_are_left_alone(half, untouched):
@@ -318,8 +306,9 @@ def test_files_of_others_in_the_folder_are_left_alone(half, untouched):
 def test_campaign_json_with_an_invalid_key_is_refused(untouched, key, value):
     about = untouched / "campaign.json"
     about.write_text(json.dumps({**json.loads(about.read_text()), key: value}))
-    for error in (refused(resume, untouched), refused(CampaignRun, untouched, 0)):
-        assert (error.where, error.key.startswith(key)) == (str(about), True)
+    for call in (resume, lambda folder: CampaignRun(folder, 0)):
+        with refused_input(about, match=f": {key}"):
+            call(untouched)
 
 
 def test_campaign_json_without_any_one_key_is_refused(untouched):
@@ -327,35 +316,28 @@ def test_campaign_json_without_any_one_key_is_refused(untouched):
     content = json.loads(about.read_text())
     for key in content:
         about.write_text(json.dumps({name: value for name, value in content.items() if name != key}))
-        assert refused(read_campaign, untouched).where == str(about)
+        with refused_input(about):
+            read_campaign(untouched)
 
 
 def test_campaign_that_ended_before_its_first_run_says_to_begin_again(half):
     (half / "campaign.json").unlink()
-    error = refused(resume, half)
-    assert error.where == str(half)
-    assert "begin again" in error.expected
+    with refused_input(half, match="begin again"):
+        resume(half)
 
 
 def test_summary_beside_unreadable_parts_is_kept(untouched):
     before = (untouched / "summary.parquet").read_bytes()
     (untouched / "parts").mkdir()
     (untouched / "parts" / "part-00000000.parquet").write_bytes(b"")
-    refused(resume, untouched)
+    with refused_input():
+        resume(untouched)
     assert (untouched / "summary.parquet").read_bytes() == before
-
-
-def test_package_that_is_no_longer_installed_counts_as_changed(untouched):
-    about = untouched / "campaign.json"
-    content = json.loads(about.read_text())
-    about.write_text(json.dumps({**content, "modules": {**content["modules"], "gone_away": "0"}}))
-    assert "gone_away" in str(refused(resume, untouched))
-    (change,) = CampaignRun(untouched, 0).run().changes
-    assert "gone_away" in change
 
 
 @pytest.mark.parametrize(("name", "value"), [("order.final", "much"), ("ended", None), ("run", None)])
 def test_reports_refuse_a_table_of_other_types_by_its_column(untouched, name, value):
     table = untouched / "summary.parquet"
     pl.read_parquet(table).with_columns(pl.lit(value, pl.String).alias(name)).write_parquet(table)
-    assert at(refused(lambda: CampaignFolder(untouched).runs)) == (str(table), name)
+    with refused_input(table, name):
+        _ = CampaignFolder(untouched).runs

@@ -12,6 +12,7 @@ import pytest
 from swarmwire.deploy import RunFolder, run, sweep
 from swarmwire.deploy.campaigns import sweep as sweeping
 from swarmwire.deploy.campaigns.spec import campaign_file, spec_in
+from swarmwire.deploy.campaigns.sweep import NoObserver
 from swarmwire.metrics.records.campaign.campaign_json import read_campaign
 from tests.support.deploy.campaign import InThisProcess, rows_in, scenario_in, series_in
 from tests.support.deploy.runs import called
@@ -29,6 +30,13 @@ robots.pair.count = [3]
 """
 
 
+def agent_in(folder, name, step):
+    """An agent of a step in a file of this folder, as scenarios name it."""
+    code = f"from swarmwire.agent import Agent\nclass Mine(Agent):\n    def step(self, it): {step}\n"
+    (folder / f"{name}.py").write_text(code)
+    return f"{name}.py:Mine"
+
+
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory):
     """A campaign of four points."""
@@ -43,15 +51,9 @@ def reference(tmp_path_factory):
 
 def test_row_of_a_sweep_has_what_a_run_of_its_own_has(reference):
     rows = rows_in(reference / "c")
-    assert [(row["run"], row["point"], row["seed"]) for row in rows] == [
-        (i, i // 3, i % 3 + 1) for i in range(12)
-    ]  # fmt: skip
-    assert [(row["radio.loss"], row["robots.pair.count"]) for row in rows[::3]] == [
-        (0.0, 2),
-        (0.0, 3),
-        (0.8, 2),
-        (0.8, 3),
-    ]
+    assert [(row["run"], row["point"], row["seed"]) for row in rows] == [(i, i // 3, i % 3 + 1) for i in range(12)]
+    points = [(row["radio.loss"], row["robots.pair.count"]) for row in rows[::3]]
+    assert points == [(0.0, 2), (0.0, 3), (0.8, 2), (0.8, 3)]
     alone = run(reference / "two.toml", seed=2, overrides=["radio.loss=0.8", "robots.pair.count=3"])
     row, radio = rows[10], alone.radio
     assert radio is not None
@@ -82,10 +84,8 @@ def test_series_hold_each_ticks_metrics(reference):
 
 def test_campaign_folder_says_what_was_run_and_holds_nothing_else(reference):
     about = json.loads((reference / "c" / "campaign.json").read_text())
-    assert sorted(path.name for path in (reference / "c").iterdir()) == [
-        "campaign.json", "scenario", "series", "summary.parquet"
-    ]  # fmt: skip
-    assert about["format"] == 1
+    names = {path.name for path in (reference / "c").iterdir()}
+    assert names == {"campaign.json", "scenario", "series", "summary.parquet"}
     assert about["vary"] == {"radio.loss": [0.0, 0.8], "robots.pair.count": [2, 3]}
     assert about["points"][2] == {"radio.loss": 0.8, "robots.pair.count": 2}
     assert about["seeds"] == [1, 2, 3]
@@ -100,12 +100,7 @@ def test_without_series_there_are_none(scenario, tmp_path, executors):
 
 
 def test_files_that_points_name_are_kept_with_the_campaign(tmp_path, scenario, executors):
-    for name, speed in (("slow", 0.01), ("fast", 0.1)):
-        code = (
-            f"from swarmwire.agent import Agent\nclass Mine(Agent):\n    def step(self, it): it.drive({speed}, 0.0)\n"
-        )
-        (tmp_path / f"{name}.py").write_text(code)
-    agents = [f"{name}.py:Mine" for name in ("slow", "fast")]
+    agents = [agent_in(tmp_path, name, f"it.drive({speed}, 0.0)") for name, speed in (("slow", 0.01), ("fast", 0.1))]
     sweep(scenario, seeds=1, vary={"robots.pair.agent": agents}, out=tmp_path / "c")
     campaign = read_campaign(tmp_path / "c")
     assert [point["robots.pair.agent"] for point in campaign.points] == agents
@@ -166,15 +161,9 @@ def test_arenas_that_stop_and_times_of_metrics_are_the_same_packed_and_alone(tmp
         assert (row["ended"] == "duration") == (row["ticks"] == 10)
     lengths = series_in(tmp_path / "packed").group_by("run").len().sort("run")["len"].to_list()
     assert lengths == [row["ticks"] for row in rows]
-    times = {
-        response.column: response.kind
-        for response in read_campaign(tmp_path / "packed").responses
-        if response.kind == "time"
-    }
-    assert times == {"stop_time_s": "time", "aggregation_time_s": "time"}
-    assert list(rows[0])[3:10] == [
-        "ended", "error", "ticks", "sim_time_s", "trajectory_sha256", "stop_time_s", "stopped_by"
-    ]  # fmt: skip
+    responses = read_campaign(tmp_path / "packed").responses
+    times = {response.column for response in responses if response.kind == "time"}
+    assert times == {"stop_time_s", "aggregation_time_s"}
 
 
 def test_agent_that_fails_for_some_seeds_costs_no_others(tmp_path, stumbling, executors):
@@ -211,22 +200,18 @@ def test_custom_metric_that_raises_is_a_failed_row(tmp_path, scenario, executors
     assert "no number" in rows_in(tmp_path / "c")[1]["error"]
 
 
-def test_error_with_text_that_no_file_can_hold_is_recorded_with_substitutes(tmp_path, scenario, executors):
-    agent = (
-        "from swarmwire.agent import Agent\nclass Odd(Agent):\n    def step(self, robot): raise OSError('a\\udc80b')\n"
-    )
-    (tmp_path / "odd.py").write_text(agent)
-    sweep(scenario, seeds=1, out=tmp_path / "c", overrides=['robots.pair.agent="odd.py:Odd"'])
-    assert "OSError: a?b" in rows_in(tmp_path / "c")[0]["error"]
-
-
-def test_agent_with_endless_recursion_fails_alike_in_any_pack(tmp_path, scenario, executors):
-    agent = "from swarmwire.agent import Agent\nclass Deep(Agent):\n    def step(self, robot): self.step(robot)\n"
-    (tmp_path / "deep.py").write_text(agent)
+@pytest.mark.parametrize(
+    ("step", "error"),
+    [
+        ("raise OSError('a\\udc80b')", "OSError: a?b"),  # a text that no file can hold
+        ("self.step(it)", "RecursionError"),
+    ],
+)
+def test_agent_with_an_odd_error_fails_alike_in_any_pack(tmp_path, scenario, executors, step, error):
+    agent = [f"robots.pair.agent={agent_in(tmp_path, 'odd', step)}"]
     for batch in (1, 2):
-        overrides = ['robots.pair.agent="deep.py:Deep"']
-        sweep(scenario, seeds=2, out=tmp_path / f"packed{batch}", overrides=overrides, batch=batch)
-    assert "RecursionError" in rows_in(tmp_path / "packed1")[0]["error"]
+        sweep(scenario, seeds=2, out=tmp_path / f"packed{batch}", overrides=agent, batch=batch)
+    assert error in rows_in(tmp_path / "packed1")[0]["error"]
     assert rows_in(tmp_path / "packed1") == rows_in(tmp_path / "packed2")
 
 
@@ -236,10 +221,8 @@ def typed(monkeypatch, capsys, executors):
 
 
 def test_sweep_prints_what_it_did_and_what_to_do_next(tmp_path, scenario, typed):
-    folder = tmp_path / "c"
-    code, out, errors = typed(
-        "sweep", scenario, "--vary", "radio.loss=0:0.5:2", "--seeds", "3", "--set", "duration_s=0.3", "--out", folder
-    )  # fmt: skip
+    folder, options = tmp_path / "c", ("--vary", "radio.loss=0:0.5:2", "--seeds", "3", "--set", "duration_s=0.3")
+    code, out, errors = typed("sweep", scenario, *options, "--out", folder)
     assert (code, errors) == (0, "")
     for text in ("two robots: 2 points x 3 seeds = 6 runs", "6/6 runs", f"swarmwire report {folder}"):
         assert text in out
@@ -252,11 +235,8 @@ def test_sweep_prints_what_it_did_and_what_to_do_next(tmp_path, scenario, typed)
 
 def test_seeds_mean_the_same_to_run_to_sweep_and_in_a_campaigns_file(tmp_path, scenario, typed):
     arguments = (scenario, "--seeds", "2", "--set", "duration_s=0.1", "--quiet", "--out")
-    assert (
-        typed("run", *arguments, tmp_path / "run", "--no-rrd")[0]
-        == typed("sweep", *arguments, tmp_path / "sweep")[0]
-        == 0
-    )
+    assert typed("run", *arguments, tmp_path / "run", "--no-rrd")[0] == 0
+    assert typed("sweep", *arguments, tmp_path / "sweep")[0] == 0
     (tmp_path / "file.toml").write_text(f'format = 1\nscenario = "{scenario.name}"\nseeds = 2\nrecord_seeds = "2"\n')
     of_file = spec_in(tmp_path / "file.toml", campaign_file(tmp_path / "file.toml"))
     assert of_file.seeds == of_file.record_seeds == (1, 2)
@@ -271,10 +251,8 @@ def test_campaign_file_means_the_same_as_options_which_override_it(tmp_path, sce
     assert typed("sweep", scenario, *options, "--set", "duration_s=0.3", "--out", tmp_path / "b")[0] == 0
     assert rows_in(tmp_path / "a") == rows_in(tmp_path / "b")
     assert json.loads((tmp_path / "a" / "campaign.json").read_text())["name"] == "losses"
-    assert (
-        typed("sweep", tmp_path / "losses.toml", "--seeds", "1", "--vary", "radio.loss=0.1", "--out", tmp_path / "c")[0]
-        == 0
-    )
+    fewer = ("--seeds", "1", "--vary", "radio.loss=0.1")
+    assert typed("sweep", tmp_path / "losses.toml", *fewer, "--out", tmp_path / "c")[0] == 0
     assert [row["radio.loss"] for row in rows_in(tmp_path / "c")] == [0.1]
 
 
@@ -356,19 +334,15 @@ def test_repeat_of_a_campaign_takes_the_number_of_a_run(tmp_path, scenario, type
     assert typed("repeat", tmp_path / "again", "--run", "0")[0] == 2
 
 
-class Interrupting:
-    """Looks on, and presses Ctrl-C after the first task."""
+class Interrupting(NoObserver):
+    """Presses Ctrl-C after the first task."""
 
-    def begin(self, campaign, done, failed):
-        self.tasks = done
+    pressed = False
 
     def see(self, result):
-        self.tasks += 1
-        if self.tasks == 1:
+        if not self.pressed:
+            self.pressed = True
             os.kill(os.getpid(), signal.SIGINT)
-
-    def end(self):
-        pass
 
 
 def test_ctrl_c_ends_it_with_a_word_how_to_go_on(tmp_path, scenario, typed, monkeypatch):

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from contextlib import closing
 
 import psutil
 import pytest
@@ -27,22 +28,20 @@ def same(folder, reference):
     assert series_in(folder).equals(series_in(reference), null_equal=True)
 
 
-def ignored(*_):
-    """Keeps nothing."""
-
-
 def tasks_of(scenario, *seeds, overrides=()):
     return [Task(str(scenario), overrides, 0, (seed,), (seed,)) for seed in seeds]
 
 
-def test_worker_that_dies_is_replaced_and_its_deadly_seed_is_a_failed_row(stumbling):
-    executor, rows = LocalExecutor(1), []
-    tasks = tasks_of(stumbling, 1, DEADLY, 4, overrides=('robots.pair.params.how="kill"',))
-    try:
+def executed(tasks, workers=1):
+    """The rows of tasks that worker processes have done."""
+    rows = []
+    with closing(LocalExecutor(workers)) as executor:
         assert execute(tasks, executor, lambda _, result: rows.extend(result.rows))
-        assert len(executor.pids) == 1
-    finally:
-        executor.close()
+    return rows
+
+
+def test_worker_that_dies_is_replaced_and_its_deadly_seed_is_a_failed_row(stumbling):
+    rows = executed(tasks_of(stumbling, 1, DEADLY, 4, overrides=('robots.pair.params.how="kill"',)))
     assert [(row["seed"], row["ended"]) for row in rows] == [(1, "duration"), (DEADLY, "failed"), (4, "duration")]
     assert "signal 9" in rows[1].pop("error")
     assert rows[1] == {"run": 2, "point": 0, "seed": DEADLY, "ended": "failed"}
@@ -51,24 +50,15 @@ def test_worker_that_dies_is_replaced_and_its_deadly_seed_is_a_failed_row(stumbl
 def test_agent_that_asks_for_input_gets_none_and_takes_no_task(scenario):
     agent = "from swarmwire.agent import Agent\nclass Asking(Agent):\n    def step(self, robot): input('go on? ')\n"
     (scenario.parent / "asking.py").write_text(agent)
-    executor, rows = LocalExecutor(1), []
-    tasks = tasks_of(scenario, 1, 2, overrides=('robots.pair.agent="asking.py:Asking"',))
-    try:
-        assert execute(tasks, executor, lambda _, result: rows.extend(result.rows))
-    finally:
-        executor.close()
+    rows = executed(tasks_of(scenario, 1, 2, overrides=('robots.pair.agent="asking.py:Asking"',)))
     assert [row["ended"] for row in rows] == ["failed", "failed"]
     assert "EOFError" in rows[0]["error"]
 
 
 def test_workers_that_cannot_start_are_one_line(scenario, monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    executor = LocalExecutor(2)
-    try:
-        with pytest.raises(SwarmwireError, match="exit code 1"):
-            execute(tasks_of(scenario, 1, 2), executor, ignored)
-    finally:
-        executor.close()
+    with pytest.raises(SwarmwireError, match="exit code 1"):
+        executed(tasks_of(scenario, 1, 2), workers=2)
 
 
 FROZEN = """
@@ -98,12 +88,8 @@ class WhileFrozen(FakeClock):
 def test_worker_that_is_frozen_is_ended_and_its_runs_are_done_by_another(scenario, monkeypatch, always, ended):
     monkeypatch.setattr(local, "Silence", lambda: Silence(WhileFrozen(), max_s=2.0))
     (scenario.parent / "frozen.py").write_text(FROZEN)
-    executor, rows = LocalExecutor(1), []
     agent = ('robots.pair.agent="frozen.py:Frozen"', f"robots.pair.params.always={str(always).lower()}")
-    try:
-        assert execute([Task(str(scenario), agent, 0, (0,), (1,))], executor, lambda _, done: rows.extend(done.rows))
-    finally:
-        executor.close()
+    rows = executed(tasks_of(scenario, 1, overrides=agent))
     assert [row["ended"] for row in rows] == [ended]
     if always:
         assert rows[0]["error"] == "the worker stood still for 2 s"
@@ -145,9 +131,8 @@ def test_campaign_that_is_killed_leaves_no_worker_and_can_be_resumed(tmp_path, e
 def test_worker_ends_with_its_campaign_also_in_the_middle_of_a_run(tmp_path):
     """Of runs of half a second, and of a day, which would take minutes."""
     arguments = (str(scenario_in(tmp_path)), str(tmp_path / "c"), "duration_s", "0.5", "100000.0")
-    with subprocess.Popen(
-        [sys.executable, "-c", KILLED, *arguments], stdout=subprocess.PIPE, text=True, cwd=ROOT
-    ) as process:
+    command = [sys.executable, "-c", KILLED, *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         try:
             assert process.stdout is not None
             lines = iter(process.stdout)

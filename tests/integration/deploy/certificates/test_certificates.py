@@ -46,10 +46,8 @@ SHORT = ("robots.flock.count=2", "duration_s=3", "radio.loss=0")
 def test_git_ignores_the_ca(tmp_path: Path):
     begin_authority(tmp_path / "ca", WallClock())
     subprocess.run(["git", "init", "-q", tmp_path], check=True)
-    status = subprocess.run(
-        ["git", "-C", tmp_path, "status", "--porcelain"], check=True, capture_output=True, text=True
-    )
-    assert status.stdout == ""
+    command = ["git", "-C", tmp_path, "status", "--porcelain"]
+    assert subprocess.run(command, check=True, capture_output=True, text=True).stdout == ""
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl is not installed")
@@ -104,13 +102,8 @@ def test_robots_receive_one_another_and_no_forged_sender(folder: Path, opened: E
     wait_for_listeners(speaker, own_keys[0])
     speaker.put(own_keys[0], b"")
     assert inbox.next() == own_keys[0]
-    for key in (
-        own_keys[0],
-        KEYS.radio("flock-0", 1),
-        KEYS.pose("flock_2"),
-        KEYS.bridge_received("flock-0"),
-        own_keys[1],
-    ):
+    forged = own_keys[0], KEYS.radio("flock-0", 1), KEYS.pose("flock_2"), KEYS.bridge_received("flock-0")
+    for key in (*forged, own_keys[1]):
         wait_for_listeners(forger, key)
         forger.put(key, b"")
     assert inbox.next() == own_keys[1]
@@ -199,12 +192,8 @@ def test_certificates_of_another_ca_are_refused(folder: Path, opened: ExitStack,
     issue(foreign, [certificate_request("flock-1", ADDRESSES)], 1, WallClock())
     endpoint = endpoint_of(opened.enter_context(closed_after(ours(folder, "flock-0"))))
     close_session(stranger(endpoint, folder, (folder, "flock-1"), PATIENT_MS))
-    refused: list[tuple[str, tuple[Path, str] | None]] = [
-        (endpoint, (foreign, "flock-1")),  # signed by another CA
-        (endpoint, None),  # no certificate
-        (endpoint.replace("tls/", "tcp/"), None),  # in plain text
-    ]
-    for where, certificate in refused:
+    in_plain_text = endpoint.replace("tls/", "tcp/")
+    for where, certificate in ((endpoint, (foreign, "flock-1")), (endpoint, None), (in_plain_text, None)):
         with pytest.raises(zenoh.ZError):
             stranger(where, folder, certificate, REFUSED_MS)
 

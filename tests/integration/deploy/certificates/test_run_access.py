@@ -67,10 +67,8 @@ class World:
     """The agents' endpoint of a world: it answers to session_info and join, and keeps what else it hears."""
 
     def __init__(self, folder: Path, opened: ExitStack) -> None:
-        network = as_name(folder, "world")
-        self.session = opened.enter_context(
-            closed_after(open_world(LISTEN, TIMEOUT_S, network, agents_access(KEYS, ACCESS)))
-        )
+        world = open_world(LISTEN, TIMEOUT_S, as_name(folder, "world"), agents_access(KEYS, ACCESS))
+        self.session = opened.enter_context(closed_after(world))
         self.endpoint = listens_at(self.session)[0]
         self.received: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
         self.queries: list[str] = []
@@ -101,10 +99,8 @@ def endpoint(request: pytest.FixtureRequest, world: World, folder: Path, opened:
     """Where a runner calls: the world, or a router before it."""
     at = world.endpoint
     for name in ("gate", "gate2")[: request.param]:
-        router = opened.enter_context(
-            closed_after(open_router(LISTEN, at, as_name(folder, name), router_access(ACCESS)))
-        )
-        at = listens_at(router)[0]
+        router = closed_after(open_router(LISTEN, at, as_name(folder, name), router_access(ACCESS)))
+        at = listens_at(opened.enter_context(router))[0]
     return at
 
 
@@ -187,9 +183,14 @@ def test_certificate_of_another_ca_gets_no_link(folder, strangers, world):
     assert not world.session.info.links()
 
 
+def observed(folder: Path, opened: ExitStack) -> zenoh.Session:
+    """The observers' endpoint of a world."""
+    world = open_observed(LISTEN, as_name(folder, "world"), observers_access(SEEN, ACCESS))
+    return opened.enter_context(closed_after(world))
+
+
 def test_observers_observe_and_operators_control(folder, opened):
-    network, access = as_name(folder, "world"), observers_access(SEEN, ACCESS)
-    world = opened.enter_context(closed_after(open_observed(LISTEN, network, access)))
+    world = observed(folder, opened)
     for key in (SEEN.scene, SEEN.status, SEEN.control):
         world.declare_queryable(key, at_once(lambda query: query.reply(query.key_expr, b"yes")))
     token = world.liveliness().declare_token(SEEN.published)
@@ -204,9 +205,7 @@ def test_observers_observe_and_operators_control(folder, opened):
 
 
 def test_observers_receive_the_truth(folder, opened):
-    world = opened.enter_context(
-        closed_after(open_observed(LISTEN, as_name(folder, "world"), observers_access(SEEN, ACCESS)))
-    )
+    world = observed(folder, opened)
     endpoint = listens_at(world)[0]
     keys: queue.SimpleQueue[str] = queue.SimpleQueue()
     for name in ("a", "wall"):

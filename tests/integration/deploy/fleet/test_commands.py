@@ -18,6 +18,7 @@ from tests.support.deploy.runs import ROOT
 
 PLAIN = Network(listen=("tcp/127.0.0.1:0",))
 KEYS = SwarmKeys("lab")
+STOPPED_BY_SSH = "stopped, confirmed by SSH (over the network: no answer)"
 
 
 @pytest.fixture
@@ -123,8 +124,7 @@ def test_estop_stops_over_both_routes(fleet, robots):
     robots("deploy")
     robots("start")
     with on_network(["flock-0"]) as (port, stopped):
-        fleet.table["robots"]["flock-0"]["network_port"] = port
-        fleet.write()
+        fleet.change("flock-0", network_port=port)
         assert robots("estop") == (0, ["flock-0 stopped, confirmed over the network and by SSH"])
     assert stopped == ["flock-0"]
     assert (host.root / "flock-0" / "log" / "stopped").exists()
@@ -135,18 +135,14 @@ def test_estop_is_confirmed_by_ssh_alone(fleet, robots, impatient):
     fleet.add("flock-1", host)
     robots("deploy")
     robots("start")
-    assert robots("estop") == (
-        0,
-        [f"flock-{i} stopped, confirmed by SSH (over the network: no answer)" for i in (0, 1)],
-    )
+    assert robots("estop") == (0, [f"flock-{i} {STOPPED_BY_SSH}" for i in (0, 1)])
     assert (host.root / "flock-1" / "log" / "stopped").exists()
 
 
 def test_estop_shows_a_confirmation_and_the_fault_of_the_other_route(fleet, robots):
     fleet.add("flock-0")
     with on_network(["flock-0"]) as (port, _):
-        fleet.table["robots"]["flock-0"]["network_port"] = port
-        fleet.write()
+        fleet.change("flock-0", network_port=port)
         (fleet.folder / "known_hosts").write_bytes(b"\xff\xfe")
         code, (line,) = robots("estop")
     assert (code, line.partition(" (")[0]) == (0, "flock-0 stopped, confirmed over the network")
@@ -159,7 +155,7 @@ def test_estop_reports_an_unconfirmed_robot_and_stops_the_others(fleet, robots, 
     robots("deploy", "--robots", "good")
     code, lines = robots("estop")
     assert code == 1
-    assert lines[0] == "good stopped, confirmed by SSH (over the network: no answer)"
+    assert lines[0] == f"good {STOPPED_BY_SSH}"
     assert lines[1].startswith("lost failed: NOT CONFIRMED: over the network: no answer; by SSH: pi@127.0.0.1:")
     assert lines[1].endswith("; switch it off by hand")
 
@@ -167,8 +163,7 @@ def test_estop_reports_an_unconfirmed_robot_and_stops_the_others(fleet, robots, 
 def test_estop_does_not_accept_another_reply_as_stopped(fleet, robots):
     fleet.servers.close(fleet.add("flock-0"))
     with on_network(["flock-0"], "the driver is lost") as (port, _):
-        fleet.table["robots"]["flock-0"]["network_port"] = port
-        fleet.write()
+        fleet.change("flock-0", network_port=port)
         code, lines = robots("estop")
     assert code == 1
     assert "over the network: the driver is lost" in lines[0]
@@ -191,8 +186,7 @@ def test_estop_with_certificates_needs_the_operators_own(fleet, robots, lab_cert
     files = {"ca": folder / "ca.pem", "certificate": folder / "flock-0.pem", "key": folder / "flock-0.key"}
     robot = Network(listen=("tls/127.0.0.1:0",), **files)
     with on_network(["flock-0"], network=robot, access=access_control(KEYS, ["flock-0"], "flock-0")) as (port, stopped):
-        fleet.table["robots"]["flock-0"]["network_port"] = port
-        fleet.write()
+        fleet.change("flock-0", network_port=port)
         assert robots("estop")[1][0].startswith("flock-0 stopped, confirmed over the network (by SSH: ")
         fleet.table["operator"] = "flock-0"  # a robot's certificate, which may stop nobody
         fleet.write()
@@ -379,16 +373,11 @@ def test_host_drives_two_crazyflies_over_two_radios(fleet, robots, impatient):
     assert (code, len(lines), base.commands) == (2, 1, [])
     assert "robots.cf-1.driver.address: expected another device than Crazyradio 0 " in lines[0]
 
-    fleet.table["robots"]["cf-1"]["driver"]["address"] = "radio://1/90/2M/E7E7E7E702"
-    fleet.write()
+    fleet.change("cf-1", driver={"address": "radio://1/90/2M/E7E7E7E702"})
     assert [line.split()[:2] for line in robots("deploy")[1]] == [["cf-0", "deployed"], ["cf-1", "deployed"]]
     first = base.current("cf-1")
-    fleet.table["robots"]["cf-1"]["max_linear_mps"] = 0.2
-    fleet.write()
+    fleet.change("cf-1", max_linear_mps=0.2)
     assert "deployed" in robots("deploy")[1][1]
     assert [line.split()[1] for line in robots("start")[1]] == ["started:", "started:"]
-    assert robots("estop") == (
-        0,
-        [f"{name} stopped, confirmed by SSH (over the network: no answer)" for name in ("cf-0", "cf-1")],
-    )
+    assert robots("estop") == (0, [f"{name} {STOPPED_BY_SSH}" for name in ("cf-0", "cf-1")])
     assert robots("rollback", "--robots", "cf-1") == (0, [f"cf-1 back to {first}"])

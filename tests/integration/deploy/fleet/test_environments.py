@@ -1,6 +1,7 @@
 """Environments that are made on robots, and their logs."""
 
 import io
+import platform
 import subprocess
 import sys
 import tarfile
@@ -16,6 +17,7 @@ from swarmwire.deploy.robots.archives import Archive
 from swarmwire.deploy.robots.host_side.files import Refusal, unpack
 from swarmwire.deploy.robots.packages import LockedEnvironments, RobotPlatform, pins
 from swarmwire.deploy.robots.result import HostFailed
+from tests.support.deploy.fleet.hosts import PYTHON
 
 TARGET = RobotPlatform((3, 11), "aarch64", (2, 36))
 OF_PI = "cp39-abi3-manylinux_2_28_aarch64"
@@ -63,10 +65,8 @@ def names(archive: Archive) -> set[str]:
 def test_archive_of_wheels_excludes_unused_files(tmp_path, wheels):
     swarmwire, others = archives(tmp_path, wheels)
     assert {"swarmwire/agent/cli.py", "swarmwire/comms/base/clock.py"} <= names(swarmwire)
-    assert any(
-        name.endswith(f"swarmwire_agent-{version('swarmwire-agent')}.dist-info/entry_points.txt")
-        for name in names(swarmwire)
-    )
+    about = f"swarmwire_agent-{version('swarmwire-agent')}.dist-info/entry_points.txt"
+    assert any(name.endswith(about) for name in names(swarmwire))
     assert not any("__pycache__" in name for name in names(swarmwire))
     packed = names(others)
     assert {"numpy_small.py", "msgpack_small.py", "of_data_eclipse_zenoh.py"} <= packed
@@ -98,8 +98,6 @@ def test_index_has_wheels_for_a_raspberry_pi(tmp_path, python, glibc, driver):
 
 @pytest.mark.slow
 def test_archives_for_this_machine_run_the_agents_program(tmp_path):
-    import platform
-
     libc = platform.libc_ver()[1].split(".")
     target = RobotPlatform(sys.version_info[:2], platform.machine(), (int(libc[0]), int(libc[1])))
     paths = []
@@ -107,14 +105,8 @@ def test_archives_for_this_machine_run_the_agents_program(tmp_path):
         paths.append(str(tmp_path / str(i)))
         with tarfile.open(archive.path) as tar:
             tar.extractall(paths[-1], filter="data")
-    bare = getattr(sys, "_base_executable", sys.executable)  # of which this project's packages are no part
-    done = subprocess.run(
-        [bare, "-P", "-m", "swarmwire.agent.cli", "drivers"],
-        env={"PYTHONPATH": ":".join(paths)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command, environment = [PYTHON, "-P", "-m", "swarmwire.agent.cli", "drivers"], {"PYTHONPATH": ":".join(paths)}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert "epuck2" in done.stdout, done.stderr
 
 
@@ -153,8 +145,7 @@ def sends(fleet, robots, tmp_path, monkeypatch):
     monkeypatch.setattr(logs, "MAX_BYTES", 10_000)
 
     def fetched(command):
-        (host.bin / "tar").write_text(f"#!/bin/sh\nexec {command}\n")
-        (host.bin / "tar").chmod(0o755)
+        host.set_program("tar", f"exec {command}")
         return robots("logs", "--fetch", tmp_path / "logs")
 
     return fetched
@@ -185,15 +176,16 @@ def test_unpack_counts_empty_files(tmp_path):
         unpack(file, tmp_path / "log", max_bytes=10_000)
 
 
-def member(
-    name: str, kind: bytes = tarfile.REGTYPE, link: str = "", data: bytes = b""
-) -> tuple[tarfile.TarInfo, bytes]:
+Member = tuple[tarfile.TarInfo, bytes]
+
+
+def member(name: str, kind: bytes = tarfile.REGTYPE, link: str = "", data: bytes = b"") -> Member:
     info = tarfile.TarInfo(name)
     info.type, info.linkname, info.size = kind, link, len(data)
     return info, data
 
 
-def packed(*members: tuple[tarfile.TarInfo, bytes]) -> bytes:
+def packed(*members: Member) -> bytes:
     archives = io.BytesIO()
     with tarfile.open(fileobj=archives, mode="w:gz") as tar:
         for info, data in members:
@@ -215,15 +207,11 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("sent", HOSTILE.values(), ids=HOSTILE.keys())
-def test_fetch_of_a_hostile_archive_leaves_nothing(fleet, robots, tmp_path, sent):
-    host, to = fleet.add("flock-0"), tmp_path / "logs"
-    (host.root / "flock-0" / "log" / "flock-0-1").mkdir(parents=True)
-    (host.bin / "sent").write_bytes(sent)
-    (host.bin / "tar").write_text(f"#!/bin/sh\nexec cat {host.bin}/sent\n")
-    (host.bin / "tar").chmod(0o755)
-    code, lines = robots("logs", "--fetch", to)
+def test_fetch_of_a_hostile_archive_leaves_nothing(sends, tmp_path, sent):
+    (tmp_path / "sent").write_bytes(sent)
+    code, lines = sends(f"cat {tmp_path}/sent")
     assert code == 1
     assert lines[0].startswith("flock-0 failed: its log cannot be unpacked: ")
     assert len(lines) == 2
-    assert not list(to.iterdir())
+    assert not list((tmp_path / "logs").iterdir())
     assert not list(tmp_path.rglob("outside"))

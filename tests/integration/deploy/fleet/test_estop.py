@@ -36,8 +36,7 @@ def on_wire(fleet, impatient):
     """flock-0 in the swarm's network; its host is out of reach."""
     fleet.servers.close(fleet.add("flock-0"))
     with on_network(["flock-0"]) as (port, stopped):
-        fleet.table["robots"]["flock-0"]["network_port"] = port
-        fleet.write()
+        fleet.change("flock-0", network_port=port)
         yield stopped
 
 

@@ -15,7 +15,6 @@ from swarmwire.agent.on_robot.safety import StopFlag
 from swarmwire.agent.on_robot.settings import read_settings
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import WallClock
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.comms.observe.interfaces import Observer
 from swarmwire.comms.observe.truth import Truth
 from swarmwire.comms.robot.packets import Fate
@@ -23,6 +22,7 @@ from swarmwire.deploy import Recording, Simulation, run
 from swarmwire.deploy.runs.gateways import serving
 from swarmwire.deploy.runs.gateways.gateways import Gateways
 from tests.support.deploy.runs import ROOT
+from tests.support.refusals import refused_input
 
 HALL, AIR = (ROOT / "examples" / "motion" / f"{name}.toml" for name in ("hall", "air"))
 BARE = Recording(tables=False, rrd=False)
@@ -77,10 +77,8 @@ def test_robots_of_a_hall_are_out_of_range_in_the_radio_of_another_run_once_they
     with hall, running(hall), ThreadPoolExecutor(2) as pool:
         assert hall.served is not None
         overrides = [f"radio.range_m={RANGE_M}", f'robots.hall.motion.connect=["{hall.served.endpoints[0]}"]']
-        air = Simulation(
-            AIR, gateways="radio-only", out=tmp_path / "air", record=BARE, overrides=overrides, observers=[fates]
-        )
-        with air:
+        options = {"out": tmp_path / "air", "record": BARE, "overrides": overrides, "observers": [fates]}
+        with Simulation(AIR, gateways="radio-only", **options) as air:
             assert air.served is not None
             air.run(1)  # in the first tick robots are where the scenario places them
             files = [robot.file for robot in air.served.robots]
@@ -118,10 +116,10 @@ def test_settings_of_robots_elsewhere_have_neither_a_driver_nor_the_limits_of_em
     assert robot.settings["radio"]["kind"] == "world"
     assert robot.command is not None
     assert robot.command.endswith("robots/other-0.toml --driver NAME --address ADDRESS")
-    with pytest.raises(BadInput, match="driver"):
+    with refused_input(match="driver"):
         read_settings(robot.file, {})
 
 
 def test_robots_elsewhere_have_no_address_here(scenario):
-    with pytest.raises(BadInput, match="elsewhere"):
+    with refused_input(match="elsewhere"):
         run(scenario, gateways={"other": "radio-only@127.0.0.1:1000"}, realtime=100.0)

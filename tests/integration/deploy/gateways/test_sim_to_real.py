@@ -69,9 +69,7 @@ def through_gateway(
         assert result.realtime is not None
         if result.realtime.missed_ticks <= MAX_MISSED * result.ticks:
             return measured(result.arenas[0], speeds.means(0)), result
-    pytest.skip(
-        f"more than {MAX_MISSED:.0%} of the ticks missed at every pace: that tells of this machine, not of robots"
-    )
+    pytest.skip(f"over {MAX_MISSED:.0%} of the ticks missed at every pace: that tells of this machine, not of robots")
 
 
 @pytest.mark.parametrize(

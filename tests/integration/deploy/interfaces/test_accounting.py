@@ -60,14 +60,8 @@ def test_capture_has_frames_that_tshark_dissects_beside_messages(tmp_path, radio
     assert ping.returncode == 0, ping.stdout
     assert swarmwire("export", world.folder, "--to", tmp_path / "t.pcapng").returncode == 0
     fields = ("_ws.malformed", "icmp.type", "arp.opcode", "stp.root.hw")
-    command = [
-        "tshark",
-        "-r",
-        str(tmp_path / "t.pcapng"),
-        "-T",
-        "fields",
-        *(x for name in fields for x in ("-e", name)),
-    ]
+    command = ["tshark", "-r", str(tmp_path / "t.pcapng"), "-T", "fields"]
+    command += [word for name in fields for word in ("-e", name)]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     rows = [row.split("\t") for row in ended.stdout.splitlines()]
     assert {row[0] for row in rows} == {""}

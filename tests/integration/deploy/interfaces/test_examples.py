@@ -151,9 +151,8 @@ def test_tcp_over_80211n_takes_slower_bit_rates_as_robots_drive_apart(tmp_path, 
         world.process.wait(60.0)
     packets = RunFolder(world.folder).packets()
     packets = packets.filter((packets["sender"] == 1) & (packets["fate"] == "received"))
-    ppdus = packets.group_by("on_air_at_ns").agg(
-        pl.col("size_bytes").sum(), pl.col("final_at_ns").max(), pl.col("distance_m").mean()
-    )
+    sums = pl.col("size_bytes").sum(), pl.col("final_at_ns").max(), pl.col("distance_m").mean()
+    ppdus = packets.group_by("on_air_at_ns").agg(*sums)
     rates_mbps = 8e3 * ppdus["size_bytes"] / (ppdus["final_at_ns"] - ppdus["on_air_at_ns"])
     near_mbps = rates_mbps.filter(ppdus["distance_m"] < 10).to_numpy().max()
     far_mbps = rates_mbps.filter(ppdus["distance_m"] > 48).to_numpy().max()
@@ -180,9 +179,8 @@ def test_iperf3_throughput_follows_the_distance_of_robots_that_another_simulator
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM if source == "udp" else socket.SOCK_STREAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = str(probe.getsockname()[1])
-    scenario = (
-        (tmp_path / "throughput.toml").read_text().replace("../interfaces/standing.py:Standing", "still.py:Still")
-    )
+    scenario = (tmp_path / "throughput.toml").read_text()
+    scenario = scenario.replace("../interfaces/standing.py:Standing", "still.py:Still")
     motion, examples = f"source='udp', listen='127.0.0.1:{port}'", ROOT / "examples" / "motion"
     command = [sys.executable, str(examples / "simulator.py"), f"127.0.0.1:{port}", "60", "9"]
     if source == "ros2":
@@ -205,12 +203,8 @@ def test_iperf3_throughput_follows_the_distance_of_robots_that_another_simulator
             world.process.wait(60.0)
         started.result().kill()
         started.result().wait()
-    done = subprocess.run(
-        [sys.executable, str(tmp_path / "throughput.py"), str(world.folder)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    program = [sys.executable, str(tmp_path / "throughput.py"), str(world.folder)]
+    done = subprocess.run(program, capture_output=True, text=True, check=False)
     rows = [[float(number) for number in re.findall(r"[\d.]+", row)] for row in done.stdout.splitlines()[1:]]
     assert len(rows) >= 4, done.stderr
     reach_m = 10 ** ((16.0 + 82.0 - 20 * np.log10(4 * np.pi * 5.18e9 / 299_792_458)) / 30)
@@ -274,9 +268,8 @@ def test_babeld_routes_over_many_hops_and_around_a_dead_robot(tmp_path):
 def test_babeld_routes_between_walkers_of_a_trace_over_several_hops(tmp_path):
     """The trace gives the distances at the start; the two farthest walkers that are connected need others between."""
     scenario = (ROOT / "examples" / "motion" / "mesh.toml").read_text()
-    scenario = scenario.replace("../../scenarios", f"{ROOT}/scenarios").replace(
-        "../interfaces", f"{ROOT}/examples/interfaces"
-    )
+    for beside, folder in (("../../scenarios", "scenarios"), ("../interfaces", "examples/interfaces")):
+        scenario = scenario.replace(beside, f"{ROOT}/{folder}")
     with running(tmp_path, scenario) as world:
         lines = (ROOT / "scenarios" / "walk.movements").read_text().splitlines()
         start_m = np.array([line.split()[1:3] for line in lines], float)

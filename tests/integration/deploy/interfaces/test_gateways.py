@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import run
 from swarmwire.metrics.records.run_folder.reader import RunFolder
 from tests.support.clocks import until
 from tests.support.deploy.interfaces import DISK, STILL, line, needs_interfaces, running, with_program
+from tests.support.refusals import refused_input
 
 pytestmark = needs_interfaces
 
@@ -108,5 +108,5 @@ def test_gateway_address_that_no_robot_can_have_is_refused(tmp_path, address, ex
     pytest.importorskip("rosbags", reason="needs the extra [ros2]")
     (tmp_path / "still.py").write_text(STILL)
     (tmp_path / "scenario.toml").write_text(driven(1, "true") + "[radio.interface]")
-    with pytest.raises(BadInput, match=re.escape(expected)):
+    with refused_input(match=re.escape(expected)):
         run(tmp_path / "scenario.toml", gateways=f"ros2@{address}")

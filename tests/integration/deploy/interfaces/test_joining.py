@@ -221,9 +221,8 @@ def test_namespace_of_two_robots_or_with_the_device_or_the_network_is_refused(tm
         patch.setenv("PATH", engine)
         refusal(tmp_path, shared, "line-1", "expected a network namespace for each robot: line-0 and line-1 share one")
     places.named.ip("tuntap", "add", "radio0", "mode", "tap")
-    refusal(
-        tmp_path, f'line-0 = "netns:{places.name}"', "line-0", "expected a network namespace without a device radio0"
-    )
+    without = "expected a network namespace without a device radio0"
+    refusal(tmp_path, f'line-0 = "netns:{places.name}"', "line-0", without)
     assert "radio0" in places.named.ip("link")
     places.process.ip("address", "add", "10.77.3.1/24", "dev", "own0")
     path = scenario_file(tmp_path, f'line-0 = "pid:{pid}"')

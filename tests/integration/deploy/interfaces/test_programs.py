@@ -6,13 +6,12 @@ import re
 import signal
 
 import psutil
-import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy import repeat, run
 from tests.support.clocks import until
 from tests.support.deploy.interfaces import DISK, STILL, line, needs_interfaces, needs_program, running, with_program
 from tests.support.deploy.runs import swarmwire
+from tests.support.refusals import refused_input
 
 pytestmark = needs_interfaces
 
@@ -23,15 +22,10 @@ def test_program_knows_its_robot_and_its_output_and_end_are_kept(tmp_path):
     with running(tmp_path, scenario, "--packets", "all") as world:
         assert world.process.wait(60) == 0
     lines = world.output("line-1").splitlines()
-    assert sorted(lines[:-3]) == [
-        "ROBOT=line-1",
-        "ROBOT_INDEX=1",
-        "ROBOT_INTERFACE=radio0",
-        "ROBOT_IPV4=10.77.0.2",
-        "ROBOT_IPV6=fd53:57::2",
-        "ROBOT_MAC=02:53:57:00:00:02",
-        f"ROBOT_SCRATCH={world.folder}/programs/line-1",
-    ]
+    names = {"ROBOT": "line-1", "ROBOT_INDEX": "1", "ROBOT_INTERFACE": "radio0", "ROBOT_IPV4": "10.77.0.2"}
+    names |= {"ROBOT_IPV6": "fd53:57::2", "ROBOT_MAC": "02:53:57:00:00:02"}
+    names |= {"ROBOT_SCRATCH": f"{world.folder}/programs/line-1"}
+    assert dict(line.split("=") for line in lines[:-3]) == names
     assert lines[-3:] == ["line-1", "02:53:57:00:00:02", str(tmp_path)]
     assert (world.folder / "programs/line-1/mine").exists()
     events = json.loads((world.folder / "summary.json").read_text())["events"]
@@ -86,9 +80,9 @@ def test_program_that_is_missing_or_has_no_network_is_refused_at_the_start(tmp_p
     (tmp_path / "still.py").write_text(STILL)
     path = tmp_path / "scenario.toml"
     path.write_text(with_program(line(1), "no-such-program") + DISK + "[radio.interface]")
-    with pytest.raises(BadInput, match=r"robots.line.program: expected a program that can be run, got 'no-such"):
+    with refused_input(key="robots.line.program", match="no-such-program"):
         run(path, realtime=1, out=tmp_path / "out")
     path.write_text(with_program(line(1), "true") + DISK)
-    with pytest.raises(BadInput, match=r"line.program: expected \[radio.interface\] in the scenario"):
+    with refused_input(key="robots.line.program", match=r"\[radio.interface\]"):
         run(path, realtime=1, out=tmp_path / "out")
     assert not (tmp_path / "out").exists()

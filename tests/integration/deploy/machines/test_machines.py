@@ -33,10 +33,10 @@ OWN = b"own"  # attached to what the hostile one says itself
 def lab(folder: Path, addresses: Mapping[str, Sequence[str]], *runners: str) -> Path:
     """A CA, certificates of the world and of routers at their addresses, and of runners."""
     begin_authority(folder, WallClock())
-    members = [
-        certificate_request(name, at, "world" if name == "world" else "router") for name, at in addresses.items()
-    ]
-    issue(folder, [*members, *(certificate_request(name, purpose="runner") for name in runners)], 1, WallClock())
+    purposes = {"world": "world", **dict.fromkeys(runners, "runner")}
+    names = [*addresses, *runners]
+    requests = [certificate_request(name, addresses.get(name, ()), purposes.get(name, "router")) for name in names]
+    issue(folder, requests, 1, WallClock())
     return folder
 
 
@@ -177,11 +177,7 @@ class Hostile:
         for key in (keys.join("r0"), keys.any_join, observer_keys.control, observer_keys.scene, observer_keys.status):
             replies = [reply for reply in session.get(key, payload=request, timeout=20.0) if reply.ok]
             assert replies == [], key
-        for key in (
-            keys.any_join,
-            keys.any_session_info,
-            observer_keys.control,
-        ):  # only now: it would be asked by itself
+        for key in (keys.any_join, keys.any_session_info, observer_keys.control):  # now: it would be asked by itself
             self._entities.append(session.declare_queryable(key, at_once(self._be_asked)))
 
     def _flood(self, session: zenoh.Session, keys: Keys) -> None:

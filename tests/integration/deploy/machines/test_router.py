@@ -32,9 +32,8 @@ RUNNERS = {"r1": "8", "r2": "12"}
 
 @pytest.fixture(scope="module")
 def certs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = lab(
-        tmp_path_factory.mktemp("lab") / "ca", {"world": ADDRESSES, "gate": ADDRESSES, "gate2": ADDRESSES}, "r1", "gone"
-    )
+    at = dict.fromkeys(("world", "gate", "gate2"), ADDRESSES)
+    folder = lab(tmp_path_factory.mktemp("lab") / "ca", at, "r1", "gone")
     revoke(folder, "gone", WallClock())
     return folder
 
@@ -132,11 +131,8 @@ def joiners(tmp_path):
 
 
 def simulation_of(joiners, act, *overrides):
-    simulation = Simulation(
-        LOSSY,
-        overrides=[*joiners.overrides, "duration_s=2", *overrides],
-        listening=Listening(LOCALHOST, observer=joiners),
-    )
+    listening = Listening(LOCALHOST, observer=joiners)
+    simulation = Simulation(LOSSY, overrides=[*joiners.overrides, "duration_s=2", *overrides], listening=listening)
     simulation.watch(Watcher((lambda truth: truth.tick == 8, act)))
     return simulation
 

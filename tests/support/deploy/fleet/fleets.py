@@ -45,10 +45,8 @@ class SmallPackages:
         swarmwire = [ArchiveEntry("swarmwire/agent/cli.py", program), ArchiveEntry("swarmwire/agent/__init__.py")]
         noise = b"".join(sha256(b"%d" % i).digest() for i in range(self.size // 32))  # nothing can pack it
         others = [ArchiveEntry("other/__init__.py", self.version.encode()), ArchiveEntry("other/large.bin", noise)]
-        return [
-            write_archive(swarmwire, self.folder / "own.tar.gz"),
-            write_archive(others, self.folder / "others.tar.gz"),
-        ]
+        entries = {"own.tar.gz": swarmwire, "others.tar.gz": others}
+        return [write_archive(files, self.folder / name) for name, files in entries.items()]
 
 
 class SmallFleet:
@@ -61,18 +59,10 @@ class SmallFleet:
         write_key(client_key, folder / "id")
         self.file = folder / "fleet.toml"
         self.agent(AGENT)
-        self.table: dict[str, Any] = {
-            "format": 1,
-            "swarm": "lab",
-            "insecure": True,
-            "defaults": {
-                "address": "127.0.0.1", "user": "pi", "key": "id", "agent": "still.py:Still",
-                "driver": {"name": "epuck2", "address": "127.0.0.1:1"},
-            },
-            "groups": {"red": {}},
-            "robots": {},
-        }  # fmt: skip
-        del self.table["defaults"]["address"]
+        driver = {"name": "epuck2", "address": "127.0.0.1:1"}
+        defaults = {"user": "pi", "key": "id", "agent": "still.py:Still", "driver": driver}
+        self.table: dict[str, Any] = {"format": 1, "swarm": "lab", "insecure": True, "defaults": defaults}
+        self.table |= {"groups": {"red": {}}, "robots": {}}
 
     def agent(self, source: str) -> None:
         """Write the agent's source."""
@@ -88,6 +78,11 @@ class SmallFleet:
         self.write()
         self.know(*self.hosts.values())
         return host
+
+    def change(self, robot: str, **values: Any) -> None:
+        """Change values of a robot."""
+        self.table["robots"][robot] |= values
+        self.write()
 
     def write(self) -> None:
         """Write the table to its file."""

@@ -76,32 +76,33 @@ class FakeHost:
         path = f"{self.bin}:/usr/bin:/bin"
         return {"HOME": str(self.home), "PATH": path, "LANG": "C.UTF-8", "XDG_RUNTIME_DIR": str(self.home / ".run")}
 
+    def set_program(self, name: str, script: str) -> None:
+        """Replace a program of the host by a script."""
+        (self.bin / name).write_text(f"#!/bin/sh\n{script}\n")
+        (self.bin / name).chmod(0o755)
+
     def set_python(self, script: str) -> None:
-        """Replace the script that is the host's `python3`."""
-        (self.bin / "python3").write_text(f"#!/bin/sh\n{script}\n")
-        (self.bin / "python3").chmod(0o755)
+        """Replace the host's `python3`."""
+        self.set_program("python3", script)
 
     def files(self) -> set[str]:
         """All files and links below ~/swarmwire."""
-        return {
-            str(path.relative_to(self.root)) for path in self.root.rglob("*") if path.is_symlink() or path.is_file()
-        }
+        paths = (path for path in self.root.rglob("*") if path.is_symlink() or path.is_file())
+        return {str(path.relative_to(self.root)) for path in paths}
 
     def current(self, robot: str) -> str | None:
         link = self.root / robot / "current"
         return link.readlink().name if link.is_symlink() else None
 
     def releases(self, robot: str) -> list[str]:
-        folder = self.root / robot / "releases"
-        return sorted(path.name for path in folder.iterdir()) if folder.exists() else []
+        return sorted(path.name for path in self.root.glob(f"{robot}/releases/*"))
 
     def environments(self) -> list[str]:
-        folder = self.root / "env"
-        return sorted(path.name for path in folder.iterdir()) if folder.exists() else []
+        return sorted(path.name for path in self.root.glob("env/*"))
 
     def parts(self) -> list[str]:
         """Return incomplete files and folders."""
-        return sorted(path.name for path in self.root.rglob("*.part")) if self.root.exists() else []
+        return sorted(path.name for path in self.root.rglob("*.part"))
 
     def end_units(self) -> None:
         """Whatever a test has started ends with it."""
@@ -142,14 +143,11 @@ class HostServers:
     def change_key(self, host: FakeHost) -> None:
         """The host is another machine, or was set up anew."""
         host.host_key = new_key()
-        acceptor = next(acceptor for acceptor in self._open if acceptor.get_port() == host.port)
-        acceptor.update(server_host_keys=[host.host_key])
+        self._acceptor(host).update(server_host_keys=[host.host_key])
 
     def close(self, host: FakeHost) -> None:
         """Switch a host off."""
-        self._loop.call_soon_threadsafe(
-            next(acceptor for acceptor in self._open if acceptor.get_port() == host.port).close
-        )
+        self._loop.call_soon_threadsafe(self._acceptor(host).close)
 
     def end(self) -> None:
         """Close all, with what runs on them."""
@@ -160,20 +158,17 @@ class HostServers:
         self._thread.join(TIMEOUT_S)
         self._loop.close()
 
+    def _acceptor(self, host: FakeHost) -> asyncssh.SSHAcceptor:
+        return next(acceptor for acceptor in self._open if acceptor.get_port() == host.port)
+
     def _run(self, coroutine: Any) -> Any:
         return asyncio.run_coroutine_threadsafe(coroutine, self._loop).result(TIMEOUT_S)
 
     async def _listen(self, host: FakeHost) -> None:
-        keys = asyncssh.import_authorized_keys(self._client_key.export_public_key().decode())
-        acceptor = await asyncssh.listen(
-            "127.0.0.1",
-            0,
-            server_host_keys=[host.host_key],
-            authorized_client_keys=keys,
-            process_factory=lambda process: _serve(host, process),
-            encoding=None,
-            agent_forwarding=False,
-        )
+        authorized = asyncssh.import_authorized_keys(self._client_key.export_public_key().decode())
+        keys = {"server_host_keys": [host.host_key], "authorized_client_keys": authorized}
+        options = {"process_factory": lambda process: _serve(host, process), "encoding": None}
+        acceptor = await asyncssh.listen("127.0.0.1", 0, agent_forwarding=False, **keys, **options)
         host.port = acceptor.get_port()
         self._open.append(acceptor)
 
@@ -192,20 +187,9 @@ class HostServers:
 async def _serve(host: FakeHost, process: "asyncssh.SSHServerProcess[bytes]") -> None:
     """A command in a real shell, in the host's home."""
     host.commands.append(process.command or "")
-    pipe = asyncio.subprocess.PIPE
-    shell = await asyncio.create_subprocess_exec(
-        "/bin/sh",
-        "-c",
-        process.command or "true",
-        cwd=host.home,
-        env=host.environment,
-        stdin=pipe,
-        stdout=pipe,
-        stderr=pipe,
-    )
-    assert shell.stdin
-    assert shell.stdout
-    assert shell.stderr
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), asyncio.subprocess.PIPE)
+    command = ("/bin/sh", "-c", process.command or "true")
+    shell: Any = await asyncio.create_subprocess_exec(*command, cwd=host.home, env=host.environment, **pipes)
     feeding = asyncio.create_task(_feed(host, process, shell.stdin))
     await asyncio.gather(_print(shell.stdout, process.stdout), _print(shell.stderr, process.stderr))
     status = await shell.wait()

@@ -30,32 +30,21 @@ def result() -> Result:
     return run(LOSSY, overrides=["duration_s=1"])
 
 
+def printed_result(result: Result) -> str:
+    out = StringIO()
+    print_result(result, METRICS.values(), Console(file=out, width=160, color_system=None))
+    return out.getvalue()
+
+
 def shown(result: Result, **changes: object) -> str:
     """The table, of a run whose one arena is changed so."""
-    out = StringIO()
-    console = Console(file=out, width=160, color_system=None)
     arena = replace(result.arenas[0], **changes)  # pyright: ignore[reportArgumentType] - of any field
-    print_result(replace(result, arenas=(arena,)), METRICS.values(), console)
-    return out.getvalue()
+    return printed_result(replace(result, arenas=(arena,)))
 
 
 def row(text: str, name: str) -> str:
     line = next(line for line in text.splitlines() if line.startswith(f"  {name} "))
     return " ".join(line.split()).removeprefix(f"{name} ")
-
-
-def test_count_is_shown_as_its_total_and_level_as_statistics(result):
-    numbers = Statistics(final=3.0, mean=0.25, min=0.0, max=1.0)
-    text = shown(result, metrics={"collisions": numbers, "min_gap": numbers})
-    assert row(text, "collisions") == "3 in all"
-    assert row(text, "min_gap") == "3 0.25 0 1 m"
-    assert "final mean min max unit" in [" ".join(line.split()) for line in text.splitlines()]
-
-
-def test_time_metric_that_was_not_reached_is_shown_as_never(result):
-    never, came = Statistics(None, None, None, None), Statistics(12.5, 12.5, 12.5, 12.5)
-    assert row(shown(result, metrics={"aggregation_time_s": came}), "aggregation_time_s") == "12.5 s"
-    assert row(shown(result, metrics={"aggregation_time_s": never}), "aggregation_time_s") == "never within 1 s"
 
 
 def test_packets_row_excludes_robots_behind_obstacles_from_range(result):
@@ -74,21 +63,27 @@ def test_packets_row_excludes_robots_behind_obstacles_from_range(result):
     assert "link_pdr" not in alone
 
 
+@pytest.mark.parametrize(
+    ("name", "statistics", "expected"),
+    [
+        ("collisions", Statistics(final=3.0, mean=0.25, min=0.0, max=1.0), "3 in all"),
+        ("min_gap", Statistics(final=3.0, mean=0.25, min=0.0, max=1.0), "3 0.25 0 1 m"),
+        ("aggregation_time_s", Statistics(12.5, 12.5, 12.5, 12.5), "12.5 s"),
+        ("aggregation_time_s", Statistics(None, None, None, None), "never within 1 s"),
+    ],
+)
+def test_metric_row_has_a_total_statistics_or_when_it_was_reached(result, name, statistics, expected):
+    assert row(shown(result, metrics={name: statistics}), name) == expected
+
+
 def test_arenas_that_stopped_are_told_with_when_and_by_what_and_those_that_did_not(result):
     early, late = "order at least 0.9 for 5 s", "target_best below 0.1"
     [arena] = result.arenas
     stopped = {3: (early, 1.5), 5: (late, 0.0)}
-    arenas = [
-        replace(
-            arena, seed=seed, stopped_by=stopped.get(seed, (None, None))[0], stop_time_s=stopped.get(seed, (0, None))[1]
-        )
-        for seed in range(1, 11)
-    ]
-    out = StringIO()
-    run = replace(result, arenas=tuple(arenas), stop=(early, late), ended="duration")
-    print_result(run, METRICS.values(), Console(file=out, width=160, color_system=None))
-    rows = [line for line in out.getvalue().splitlines() if "stopped" in line]
-    assert [" ".join(row.split()) for row in rows] == [
+    ends = {seed: stopped.get(seed, (None, None)) for seed in range(1, 11)}
+    arenas = tuple(replace(arena, seed=seed, stopped_by=by, stop_time_s=at_s) for seed, (by, at_s) in ends.items())
+    text = printed_result(replace(result, arenas=arenas, stop=(early, late), ended="duration"))
+    assert [" ".join(row.split()) for row in text.splitlines() if "stopped" in row] == [
         f"stopped {early}: seed 3 since 1.5 s",
         f"stopped {late}: seed 5 since 0 s",
         f"not stopped seed 1, seed 2, seed 4, seed 6, seed 7, seed 8 and 2 more in 1 s: {early} or {late}",
@@ -96,22 +91,13 @@ def test_arenas_that_stopped_are_told_with_when_and_by_what_and_those_that_did_n
     assert "stopped" not in shown(result)
 
 
-def test_real_time_rows_agree_on_requested_and_reached_factor(result):
-    def rows(gateways: dict[str, str]) -> tuple[str, str]:
-        out = StringIO()
-        late = RealTimeReport(1.0, 2, 9.9924)
-        facts = replace(result.facts, gateways=gateways)
-        took = {"ticks": 600, "sim_time_s": 60.0, "wall_time_s": 80.64}
-        run = replace(result, **took, mode="realtime", realtime=late, facts=facts)
-        print_result(run, METRICS.values(), Console(file=out, width=160, color_system=None))
-        return row(out.getvalue(), "simulated").partition(" (")[0], row(out.getvalue(), "real time")
-
-    speed = "60 s in 80.64 s: 0.74 x real time"
-    assert rows({"flock": "epuck2"}) == (
-        speed,
-        "asked for x 1, took 20.64 s longer; 2 of 600 ticks missed, worst lag 9.99 s",
-    )
-    assert rows({}) == (speed, "asked for x 1; 2 of 600 ticks missed, worst lag 9.99 s")
+@pytest.mark.parametrize(("gateways", "longer"), [({"flock": "epuck2"}, ", took 20.64 s longer"), ({}, "")])
+def test_real_time_rows_agree_on_requested_and_reached_factor(result, gateways, longer):
+    took = {"ticks": 600, "sim_time_s": 60.0, "wall_time_s": 80.64, "realtime": RealTimeReport(1.0, 2, 9.9924)}
+    facts = replace(result.facts, gateways=gateways)
+    text = printed_result(replace(result, mode="realtime", facts=facts, **took))
+    assert row(text, "simulated").startswith("60 s in 80.64 s: 0.74 x real time (")
+    assert row(text, "real time") == f"asked for x 1{longer}; 2 of 600 ticks missed, worst lag 9.99 s"
 
 
 def test_robots_row_counts_processes_of_the_run_or_runners_that_joined_it(result):

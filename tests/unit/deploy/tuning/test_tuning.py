@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from swarmwire.comms.base.errors import BadInput
 from swarmwire.deploy.campaigns.store import StorageFailed
 from swarmwire.deploy.campaigns.tuning.spec import Search, fresh_seeds, goal_of, sample_of, search_from, search_of
 from swarmwire.deploy.campaigns.tuning.study import StudyFile
@@ -54,11 +53,8 @@ def test_choices_are_toml_values_known_by_their_texts():
     ["radio.loss", "=1", "a=", "a=0:1:5", "a=0:1:5:log", "a=0:", "a=1:1", "a=2:1", "a=0:1:log", "a=1,1", "a='1',1"],
 )
 def test_search_text_that_is_no_range_is_refused(text):
-    with pytest.raises(BadInput) as refused:
+    with refused_input(f"--search {text}", match="^((?!COUNT).)*$"):
         search(text)
-    assert refused.value.where == f"--search {text}"
-    assert "\n" not in str(refused.value)
-    assert "COUNT" not in str(refused.value)
 
 
 @pytest.mark.parametrize("text", ["a=1.1:1.2", "a=0.2:3:log"])
@@ -132,18 +128,9 @@ def test_goal_direction_decides_which_value_is_better():
     assert (least.text, most.text) == ("min order.final.q50", "max order.final.q50")
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("order", "RESPONSE.STAT"),
-        ("least order", "RESPONSE.STAT"),
-        ("min", "RESPONSE.STAT"),
-        ("min ordr.final", "order.final"),
-        ("min order.final.censored", "a time"),
-    ],
-)
-def test_another_goal_is_refused(text, expected):
-    with refused_input("--goal", match=expected):
+@pytest.mark.parametrize("text", ["order", "least order", "min", "min ordr.final", "min order.final.censored"])
+def test_another_goal_is_refused(text):
+    with refused_input("--goal"):
         goal_of(text, (ORDER, TIME), LIMIT_S)
 
 
