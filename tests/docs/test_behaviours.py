@@ -43,9 +43,8 @@ overrides = ['duration_s = 20', 'robots.nodes.count = 4', 'arena.size_m = [1.0, 
 "radio.latency_s" = [0.0, 0.5]
 """)
     own = replace(LAYOUT, campaigns=tmp_path, swept=tmp_path / "swept", data=tmp_path / "data", pages=tmp_path)
-    output = run_experiment(
-        degradation_of("consensus", own), own, None, ExecutionOptions(workers=1), Console(quiet=True)
-    )
+    options = ExecutionOptions(workers=1), Console(quiet=True)
+    output = run_experiment(degradation_of("consensus", own), own, None, *options)
     rows = [line.split("|")[1:-1] for line in output.splitlines() if "%" in line and "|" in line]
     assert [row[0].strip() for row in rows] == ["0 %", "100 %"]
     soon, late = (float(cell.split()[0]) for cell in rows[0][1:])

@@ -26,14 +26,13 @@ def test_link_to_a_missing_page_is_a_problem(page: Path):
     assert len(list(checks.links())) == 1
 
 
-def test_page_listed_twice_or_never_is_a_problem(page: Path):
-    index = page.with_name("index.md")
-    index.write_text("```{toctree}\n:caption: Pages\n\npage\n```\n")
-    assert list(checks.contents()) == []
-    index.write_text("```{toctree}\npage\n```\n\n```{toctree}\npage\n```\n")
-    assert len(list(checks.contents())) == 1
-    index.write_text("page")
-    assert len(list(checks.contents())) == 1
+LISTED = "```{toctree}\n:caption: Pages\n\npage\n```\n"
+
+
+@pytest.mark.parametrize(("index", "problems"), [(LISTED, 0), (LISTED * 2, 1), ("page", 1)])
+def test_page_listed_twice_or_never_is_a_problem(page: Path, index: str, problems: int):
+    page.with_name("index.md").write_text(index)
+    assert len(list(checks.contents())) == problems
 
 
 def test_generated_table_out_of_date_is_a_problem(page: Path):

@@ -24,10 +24,9 @@ INSTALL = "Install"
 def ran(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """A step as the service runs it, with the environment of the tests in place of the installed one."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    command = ["bash", "-e", "-o", "pipefail", "-c", line]
-    return subprocess.run(
-        command, cwd=folder, env=os.environ | {"PATH": path}, capture_output=True, text=True, timeout=280, check=False
-    )
+    command, environment = ["bash", "-e", "-o", "pipefail", "-c", line], os.environ | {"PATH": path}
+    pipes = {"capture_output": True, "text": True}
+    return subprocess.run(command, cwd=folder, env=environment, timeout=280, check=False, **pipes)
 
 
 @pytest.mark.slow

@@ -20,19 +20,10 @@ def test_radio_figures_can_be_drawn(name: str, tmp_path: Path, monkeypatch: pyte
     assert b"<svg" in (tmp_path / f"{name}.svg").read_bytes()[:1000]
 
 
-@pytest.mark.parametrize(
-    "draw",
-    [
-        parts.draw,
-        performance.draw,
-        radio_chain.draw,
-        robots.draw,
-        runner_states.draw,
-        runner_states.draw_protocol,
-        tick_figure.draw,
-        trace.draw,
-    ],
-)
+DRAWN = [module.draw for module in (parts, performance, radio_chain, robots, runner_states, tick_figure, trace)]
+
+
+@pytest.mark.parametrize("draw", [*DRAWN, runner_states.draw_protocol])
 def test_design_figures_can_be_drawn(draw: Callable[[Path], None], tmp_path: Path):
     draw(tmp_path / "figure.svg")
     assert b"<svg" in (tmp_path / "figure.svg").read_bytes()[:1000]

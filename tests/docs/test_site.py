@@ -46,9 +46,8 @@ def site(tmp_path_factory, testrun_uid) -> Path:
     with (folder / "lock").open("w") as lock:
         flock(lock, LOCK_EX)
         if not (folder / "built").exists():
-            done = subprocess.run(
-                [*command, ROOT / "docs", folder / "html"], capture_output=True, text=True, check=False, timeout=180
-            )
+            command += [ROOT / "docs", folder / "html"]
+            done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=180)
             assert done.returncode == 0, done.stderr
             assert not done.stderr
             (folder / "built").touch()
@@ -114,11 +113,8 @@ def test_bodies_page_names_every_body_its_keys_and_sources(site):
     named = code(site, "bodies")
     assert {f'kind = "{name}"' for name in DRIVES} <= named
     assert {field.name for kind in (Wheels, Twist, Holonomic, Leds, Ros2Names) for field in fields(kind)} <= named
-    assert {
-        "like",
-        *(field.name for field in fields(Body) if field.type in {"str", "float", "bool", str, float, bool}),
-    } <= named
-    assert set(body_names()) <= named
+    plain = {field.name for field in fields(Body) if field.type in {"str", "float", "bool", str, float, bool}}
+    assert {"like", *plain, *body_names()} <= named
     for name in body_names():
         assert html.escape(load_body(name).source, quote=False) in page(site, "bodies")
     assert "{}" not in page(site, "bodies"), "an empty table is no figure"

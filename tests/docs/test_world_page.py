@@ -24,14 +24,8 @@ def file_of(name: str) -> Path:
 @pytest.mark.parametrize("call", CALLS, ids=lambda match: match["owner"])
 def test_world_page_names_existing_methods(call: re.Match[str]) -> None:
     classes = [node for node in ast.parse(file_of(call["file"]).read_text()).body if isinstance(node, ast.ClassDef)]
-    methods = {
-        node.name
-        for owner in classes
-        if owner.name == call["owner"]
-        for node in owner.body
-        if isinstance(node, ast.FunctionDef)
-    }
-    assert call["method"] in methods
+    body = [node for owner in classes if owner.name == call["owner"] for node in owner.body]
+    assert call["method"] in {node.name for node in body if isinstance(node, ast.FunctionDef)}
 
 
 def test_world_page_names_every_step_of_the_tick() -> None:

@@ -25,9 +25,8 @@ def bare() -> dict[str, str]:
 
 def done(*command: str | Path, cwd: Path) -> str:
     """What a command printed; it must end well."""
-    ended = subprocess.run(
-        [str(part) for part in command], cwd=cwd, env=bare(), capture_output=True, text=True, check=False, timeout=100
-    )
+    words = [str(part) for part in command]
+    ended = subprocess.run(words, cwd=cwd, env=bare(), capture_output=True, text=True, check=False, timeout=100)
     assert ended.returncode == 0, f"{command}: {ended.returncode}\n{ended.stdout}\n{ended.stderr}"
     return ended.stdout + ended.stderr
 

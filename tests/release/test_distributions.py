@@ -37,10 +37,8 @@ def beside(name: str) -> str:
 
 
 def test_there_are_a_wheel_and_a_source_distribution_of_each(distributions: Path) -> None:
-    names = {path.name for path in distributions.iterdir() if path.suffix in {".whl", ".gz"}}
-    assert names == {
-        file for name in NAMES for file in (f"{name}-{VERSION}-py3-none-any.whl", f"{name}-{VERSION}.tar.gz")
-    }
+    files = {path.name for path in distributions.iterdir() if path.suffix in {".whl", ".gz"}}
+    assert files == {f"{name}-{VERSION}{end}" for name in NAMES for end in ("-py3-none-any.whl", ".tar.gz")}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -83,9 +81,7 @@ def test_wheel_metadata_is_valid_and_complete(distributions: Path, name: str) ->
     assert metadata.author
     kinds = {classifier.partition(" :: ")[0] for classifier in metadata.classifiers or []}
     assert {"Intended Audience", "Operating System", "Programming Language", "Typing"} <= kinds
-    assert not any(
-        classifier.startswith("License") for classifier in metadata.classifiers or []
-    )  # PEP 639: license_expression alone
+    assert "License" not in kinds  # PEP 639: license_expression alone
     ours = [requirement for requirement in metadata.requires_dist or [] if requirement.name.startswith("swarmwire")]
     assert {str(requirement.specifier) for requirement in ours} <= {f"=={VERSION}"}
 

@@ -60,11 +60,8 @@ def test_part_depends_on_no_other_of_ours_but_comms(part: str, dependencies: set
     assert {distribution(line) for line in requirements(project(part)) if "swarmwire" in line} == dependencies
 
 
-def test_namespace_package_has_no_init() -> None:
+def test_namespace_package_has_no_init_and_parts_are_marked_as_typed() -> None:
     assert not [str(path) for part in PARTS for path in (ROOT / part / "swarmwire").glob("__init__.py*")]
-
-
-def test_parts_are_marked_as_typed() -> None:
     assert all((ROOT / part / "swarmwire" / part / "py.typed").is_file() for part in PARTS)
 
 

@@ -47,16 +47,6 @@ def test_floor_is_drawn_in_greys(folder):
     draw(ROOT / "scenarios" / "maze.toml", "--to", "maze.png")
     spot = (pixels(folder / "maze.png") == round(255 * (0.45 + 0.55 * 0.2))).all(axis=2)
     assert spot.sum() > 1000
-    (folder / "half.pgm").write_text("P2 2 1 255 0 255")
-    arena = "arena.size_m=[2, 2]", "arena.obstacles=[]", "arena.boundary='open'", "arena.ground.image='half.pgm'"
-    (folder / "own.toml").write_text((ROOT / "scenarios" / "avoidance.toml").read_text())
-    draw("own.toml", "--to", "half.png", *(part for one in arena for part in ("--set", one)))
-    drawn = pixels(folder / "half.png")
-    black, white = ((drawn == round(255 * bright)).all(axis=2) for bright in (0.45, 1.0))
-    left, right = np.flatnonzero(black.sum(axis=0) > 100)[[0, -1]]
-    assert white[:, right + 20].sum() > 100  # the right half, as bright as the page
-    assert black[:, left : right + 1].mean() > 0.5
-    assert right - left == pytest.approx(black.sum(axis=0).max() / 2, abs=20)
 
 
 def test_another_seed_or_setting_is_another_picture(folder):

@@ -14,7 +14,7 @@ from swarmwire.deploy.live.live_view import PageBeside
 from swarmwire.deploy.runs.simulation import Simulation, run_to_end
 from tests.support.clocks import until
 from tests.support.deploy.page import PATIENCE_MS, chromium, family, launched, paged, requested_hosts
-from tests.support.deploy.runs import LOSSY, called
+from tests.support.deploy.runs import LOSSY, refused_command
 
 TICKS = """(count) => new Promise((done) => {
   const news = new EventSource("news"), ticks = [];
@@ -65,8 +65,8 @@ def test_page_begins_a_run_paused_and_if_killed_ends_none_and_prints_what_can_be
 
 def test_without_the_extra_it_is_named_and_no_folder_is_made(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("swarmwire.comms.base.extras.find_spec", lambda _: None)
-    code, _, errors = called(monkeypatch, capsys, "run", LOSSY, "--ui", "--out", tmp_path / "run")
-    assert (code, errors.startswith("error: --ui: "), "swarmwire[ui]" in errors) == (2, True, True)
+    command = ("run", LOSSY, "--ui", "--out", tmp_path / "run")
+    refused_command(monkeypatch, capsys, *command, match=r"--ui: .*swarmwire\[ui\]")
     assert not (tmp_path / "run").exists()
 
 
@@ -74,11 +74,7 @@ def test_page_without_a_run_is_refused_in_one_line(tmp_path, monkeypatch, capsys
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     monkeypatch.setenv("RUST_LOG", "off")
     for arguments in ([], ["3f2a"], [str(tmp_path)]):
-        code, _, errors = called(monkeypatch, capsys, "ui", *arguments)
-        assert code == 2
-        assert errors.startswith("error: ")
-        assert "live run" in errors
-        assert errors.count("\n") == 1
+        refused_command(monkeypatch, capsys, "ui", *arguments, match=".*live run")
 
 
 pytest.importorskip("fastapi", reason="needs the extra [ui]")

@@ -16,7 +16,7 @@ import pytest
 
 from swarmwire.deploy import RunFolder, repeat, run
 from tests.support.deploy.pseudo_terminal import terminal
-from tests.support.deploy.runs import LOSSY, called, swarmwire
+from tests.support.deploy.runs import LOSSY, called, refused_command, swarmwire
 
 LONG = ["--set", "duration_s=3600"]
 SHORT = ("--set", "duration_s=2")
@@ -163,9 +163,7 @@ def test_observe_address_in_use_is_refused_before_anybody_joins(tmp_path):
 def test_certificates_are_asked_for_beyond_this_machine(tmp_path, monkeypatch, capsys):
     world = ("world", LOSSY, "--listen", "tcp/0.0.0.0:0", "--out", tmp_path / "x")
     for command, where in ((world, "--listen"), (("join", "tcp/10.0.0.5:7447"), "ENDPOINT")):
-        code, _, errors = called(monkeypatch, capsys, *command)
-        assert code == 2
-        assert re.fullmatch(f"error: {where}: .*expected --certs, or --insecure.*\n", errors)
+        refused_command(monkeypatch, capsys, *command, match=f"{where}: .*expected --certs, or --insecure")
     assert not (tmp_path / "x").exists()
 
 

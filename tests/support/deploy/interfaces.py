@@ -94,9 +94,8 @@ class InterfacesRun:
 
     def on(self, robot: str, *command: str, timeout_s: float = TIMEOUT_S) -> subprocess.CompletedProcess[str]:
         """A command that has ended on a robot."""
-        return subprocess.run(
-            self.command(robot, *command), capture_output=True, text=True, timeout=timeout_s, check=False
-        )
+        words = self.command(robot, *command)
+        return subprocess.run(words, capture_output=True, text=True, timeout=timeout_s, check=False)
 
     def address(self, robot: str) -> str:
         """Its IPv4 address."""
@@ -123,9 +122,8 @@ def running(
     for name, text in {"still.py": STILL, **(files or {})}.items():
         (folder / name).write_text(text)
     out = folder / "out"
-    process = subprocess.Popen(
-        _command(folder, out, options), text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-    )
+    command = _command(folder, out, options)
+    process = subprocess.Popen(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     try:
         # A machine that compiles kernels first takes a minute or more; pytest's timeout is the limit.
         pause = Event()

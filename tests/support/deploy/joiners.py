@@ -124,12 +124,8 @@ class Joiners(JoinObserver):
         self, *overrides: str, watcher: Watcher | None = None, start_with: int | None = None, **more: Any
     ) -> Result:
         """A run that listens, to its end."""
-        simulation = Simulation(
-            LOSSY,
-            overrides=[*self.overrides, *overrides],
-            listening=Listening(LOCALHOST, start_with=start_with, observer=self),
-            **more,
-        )
+        listening = Listening(LOCALHOST, start_with=start_with, observer=self)
+        simulation = Simulation(LOSSY, overrides=[*self.overrides, *overrides], listening=listening, **more)
         if watcher is not None:
             simulation.watch(watcher)
         return run_to_end(simulation)

@@ -43,12 +43,8 @@ TIMEOUT_S = 60.0
 def authority(folder: Path) -> Path:
     """A CA with a certificate for each name, good on this machine."""
     begin_authority(folder, WallClock())
-    issue(
-        folder,
-        [certificate_request(name, ("127.0.0.1",), purpose) for name, purpose in PURPOSES.items()],
-        1,
-        WallClock(),
-    )
+    requests = [certificate_request(name, ("127.0.0.1",), purpose) for name, purpose in PURPOSES.items()]
+    issue(folder, requests, 1, WallClock())
     return folder
 
 
@@ -69,13 +65,8 @@ class GuardedWorld(Observer, JoinObserver):
 
     def run(self, out: Path) -> Result:
         """The run, to its end; what went wrong while it was disturbed is raised here."""
-        listening = Listening(
-            ("tls/127.0.0.1:0",),
-            (self.observed,),
-            network_in(self._certs, "world"),
-            access_in(self._certs),
-            observer=self,
-        )
+        own = network_in(self._certs, "world"), access_in(self._certs)
+        listening = Listening(("tls/127.0.0.1:0",), (self.observed,), *own, observer=self)
         record = Recording(tables=False, rrd=False)
         simulation = Simulation(LOSSY, overrides=SHORT, listening=listening, out=out, record=record)
         simulation.watch(self)
@@ -150,12 +141,9 @@ def machines(several: int) -> Generator[list[Machine]]:
             _permitted("ip", "-n", machine.name, "link", "set", "lo", "up")
         for i, (left, right) in enumerate(pairwise(made)):
             one, other = f"v{prefix[2:]}{i}a"[-15:], f"v{prefix[2:]}{i}b"[-15:]
-            ends = [(left, one), (right, other)]
-            _permitted(
-                *("ip", "link", "add", one, "netns", left.name),
-                *("type", "veth", "peer", "name", other, "netns", right.name),
-            )
-            for index, (machine, device) in enumerate(ends, 1):
+            peer = "type", "veth", "peer", "name", other, "netns", right.name
+            _permitted("ip", "link", "add", one, "netns", left.name, *peer)
+            for index, (machine, device) in enumerate([(left, one), (right, other)], 1):
                 machine.addresses.append(f"10.77.{i}.{index}")
                 machine.devices.append(device)
                 _permitted("ip", "-n", machine.name, "address", "add", f"{machine.addresses[-1]}/24", "dev", device)
@@ -181,14 +169,9 @@ class Started:
     """A command that runs; what it prints, on either stream, is read while it does."""
 
     def __init__(self, command: Sequence[str], cwd: Path | None = None) -> None:
-        self.process = subprocess.Popen(
-            command,
-            cwd=cwd,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "200"},
-        )
+        environment = {**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "200"}
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        self.process: subprocess.Popen[str] = subprocess.Popen(command, cwd=cwd, env=environment, **pipes)
         self.lines: list[str] = []
         self._arrived: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._reading = threading.Thread(target=self._read, daemon=True)

@@ -84,13 +84,9 @@ def terminal(*arguments: str | Path, columns: int = 80, rows: int = 24) -> Gener
     fcntl.ioctl(other, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
     before = termios.tcgetattr(user)
     start = "import os, sys; os.login_tty(0); os.execv(sys.executable, [sys.executable, '-m', *sys.argv[1:]])"
-    process = subprocess.Popen(
-        [sys.executable, "-c", start, "swarmwire.deploy", *map(str, arguments)],
-        stdin=other,
-        stdout=other,
-        stderr=other,
-        env={**os.environ, "TERM": "xterm-256color"},
-    )
+    command = [sys.executable, "-c", start, "swarmwire.deploy", *map(str, arguments)]
+    environment = {**os.environ, "TERM": "xterm-256color"}
+    process = subprocess.Popen(command, stdin=other, stdout=other, stderr=other, env=environment)
     os.close(other)
     window = Terminal(process, user, before)
     try:

@@ -1,5 +1,6 @@
 """The command line in a process of its own, and runs: recorded, watched, in a thread, in several layouts."""
 
+import re
 import subprocess
 import sys
 import threading
@@ -71,6 +72,15 @@ def called(
         main()
     out, errors = capsys.readouterr()
     return ended.value.code, out, errors
+
+
+def refused_command(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *arguments: str | Path, match: str = ""
+) -> None:
+    """Require that a call ends with exit code 2 and prints one line alone, whose begin matches."""
+    code, out, errors = called(monkeypatch, capsys, *arguments)
+    assert (code, out, errors.count("\n")) == (2, "", 1), (code, out, errors)
+    assert re.match(f"error: {match}", errors), errors
 
 
 def started(*arguments: str | Path) -> subprocess.Popen[str]:

@@ -106,9 +106,8 @@ class SmallRun:
 
     def _answer(self, runner: str, data: bytes) -> bytes:
         executor, frame = self._executors[runner], frame_codec.decode(data)
-        readings, received, tx_status = decode_tick(
-            frame, self.assignment.measures or (), readings_of(self.parts, runner)
-        )
+        own = self.assignment.measures or (), readings_of(self.parts, runner)
+        readings, received, tx_status = decode_tick(frame, *own)
         actions = executor.act(frame.tick, readings, received, tx_status)
         return encode_actions(frame.tick, with_all(actions), memory=executor.memory(readings))
 

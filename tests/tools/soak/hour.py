@@ -32,9 +32,8 @@ REAL_TIME_SHARE = 5  # an agent process of the world in real time, with a host o
 def kinds(processes: int) -> list[Kind]:
     """The worlds: troubles change nothing in lockstep; in real time robots coast meanwhile."""
     in_real_time = ("--realtime", "1", "--set", "run.on_runner_loss=coast", "--packets", "0.01", "--no-rrd")
-    hosts, alone = (
-        max(UNTOUCHED + 1, runners) for runners in (processes // PROCESSES_EACH, processes // REAL_TIME_SHARE)
-    )
+    hosts = max(UNTOUCHED + 1, processes // PROCESSES_EACH)
+    alone = max(UNTOUCHED + 1, processes // REAL_TIME_SHARE)
     return [
         Kind(LOCKSTEP, (PROCESSES_EACH,) * hosts, ("--links", "--packets", "0.001"), speed=0.5, untouched=UNTOUCHED),
         Kind("realtime", (1,) * alone, in_real_time, untouched=UNTOUCHED),

@@ -53,9 +53,8 @@ def check_owners(
         for robot in change["robots"]:
             if robot not in owner:
                 raise Broken(f"{change['runner']} {change['what']} with {robot}, which is none")
-            expected = (
-                None if change["what"] in COMES else change["runner"].partition("/")[0]
-            )  # without the process of a host
+            host = change["runner"].partition("/")[0]  # without the process of a host
+            expected = None if change["what"] in COMES else host
             # A runner that joined, and went before its agents were ready, has no other event: it never played them.
             may_be_unready = change["what"] == "lost" or (change["what"], change["reason"]) == ("left", NOT_READY)
             never_ready = may_be_unready and owner[robot] is None
@@ -119,11 +118,8 @@ def processes_with(temporary: Path) -> list[str]:
 
 def check_no_file(temporary: Path, *, killed: bool = False) -> str:
     """No socket and no temporary folder is left; of a world that was `killed` its sockets are, which the next takes."""
-    files = [
-        str(path.relative_to(temporary))
-        for path in temporary.rglob("*")
-        if not path.is_dir() or not any(path.iterdir())
-    ]
+    paths = [path for path in temporary.rglob("*") if not path.is_dir() or not any(path.iterdir())]
+    files = [str(path.relative_to(temporary)) for path in paths]
     files = [path for path in files if path not in ("own", "own/swarmwire") and not (killed and path.startswith("sw-"))]
     if files:
         raise Broken(f"left among the temporary files: {', '.join(files[:5])} ({len(files)})")

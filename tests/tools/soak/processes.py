@@ -47,9 +47,8 @@ class Supervised:
         if self._process is None and self._due_ns is not None and now_ns >= self._due_ns:
             self._due_ns = None
             with self._log.open("ab") as log:
-                self._process = subprocess.Popen(
-                    self._command(), env=dict(self._env), stdin=subprocess.DEVNULL, stdout=log, stderr=log
-                )
+                pipes = {"stdin": subprocess.DEVNULL, "stdout": log, "stderr": log}
+                self._process = subprocess.Popen(self._command(), env=dict(self._env), **pipes)
             self.starts += 1
 
     def stay_away(self) -> None:
@@ -120,13 +119,8 @@ def environment(temporary: Path) -> Mapping[str, str]:
     """The environment of all processes of a soak: temporary files go to a folder that shall be empty at its end."""
     runtime_folder = temporary / "own"
     runtime_folder.mkdir(parents=True, mode=0o700)
-    return {
-        **os.environ,
-        "TMPDIR": str(temporary),
-        "XDG_RUNTIME_DIR": str(runtime_folder),
-        "PYTHONPATH": str(ROOT),
-        "OPENBLAS_NUM_THREADS": "1",
-    }
+    folders = {"TMPDIR": str(temporary), "XDG_RUNTIME_DIR": str(runtime_folder), "PYTHONPATH": str(ROOT)}
+    return {**os.environ, **folders, "OPENBLAS_NUM_THREADS": "1"}
 
 
 Steps = Generator[float]

@@ -34,13 +34,8 @@ from tests.tools.soak.troubles import RUNNER_TROUBLES, WORLD_TROUBLES, Troubles
 ROBOTS = 8
 TIMEOUT_S = 1.5  # timeout of a runner
 SPEED = 2.0  # simulated seconds in a second
-ENDINGS = {
-    "stop": 130,
-    "SIGKILL": -9,
-    "SIGTERM": 130,
-    "SIGINT": 130,
-    "SIGHUP": 129,
-}  # how a run ends, and its exit code
+# How a run ends, and its exit code.
+ENDINGS = {"stop": 130, "SIGKILL": -9, "SIGTERM": 130, "SIGINT": 130, "SIGHUP": 129}
 
 DRAWS = st.randoms(note_method_calls=True)
 SHORT_S = st.sampled_from((0.0, 0.1, 0.5, 2.0))

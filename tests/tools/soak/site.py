@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from itertools import accumulate
+from itertools import accumulate, chain
+from operator import attrgetter
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import psutil
 
@@ -45,21 +46,6 @@ class Kind:
     starts_runners: bool = False
 
 
-class Target(Protocol):
-    """A process that troubles disturb."""
-
-    name: str
-    frozen: bool
-
-    def after(self, again_s: float) -> None:
-        """Set the time from an end to the restart."""
-        ...
-
-    def send(self, number: signal.Signals) -> bool:
-        """Send a signal; False if no process runs."""
-        ...
-
-
 class StartedRunner:
     """A runner that the run itself has started, and that nobody restarts."""
 
@@ -78,6 +64,9 @@ class StartedRunner:
         except psutil.NoSuchProcess:
             return False
         return True
+
+
+Target = Supervised | StartedRunner  # that troubles disturb
 
 
 class Site:
@@ -187,9 +176,7 @@ class Site:
         pid = runner.pid if isinstance(runner, Supervised) else None
         try:
             servers = psutil.Process(pid).children() if pid else []
-            return sorted(
-                (process for server in servers for process in server.children()), key=lambda process: process.pid
-            )
+            return sorted(chain.from_iterable(server.children() for server in servers), key=attrgetter("pid"))
         except psutil.NoSuchProcess:
             return []
 

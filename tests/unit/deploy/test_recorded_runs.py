@@ -6,18 +6,13 @@ import pytest
 from polars.testing import assert_frame_equal
 from typer.testing import CliRunner
 
-from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.errors import BadInput, SwarmwireError
 from swarmwire.comms.radio.config.presets import PRESETS
 from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Recording, RunFolder, run
 from swarmwire.deploy.cli.app import app
 from swarmwire.metrics.measures.measure import Metrics
-from swarmwire.metrics.records.run_folder import writer
-from swarmwire.metrics.records.run_folder.ticks import TickRecorder
 from swarmwire.metrics.records.run_folder.verify import verify
-from swarmwire.metrics.records.run_folder.writer import write_file
-from tests.support.clocks import GoingClock
 from tests.support.deploy.joiners import Watcher
 from tests.support.deploy.runs import LOSSY, ROOT, hastily, record_run, run_spread
 from tests.support.refusals import refused_input
@@ -132,29 +127,6 @@ def test_tables_of_packets_and_radio_are_the_same_in_every_layout(tmp_path, scen
     for table in TABLES:
         assert len(getattr(alone, table)()) > 0
         assert_frame_equal(getattr(alone, table)(), getattr(parts, table)())
-
-
-def test_full_disk_leaves_the_run_going_and_its_tables_readable(tmp_path, monkeypatch, capfd):
-    writes = iter(range(2))
-
-    def full(frame, path):
-        if next(writes, None) is None:
-            raise OSError(28, "No space left on device")
-        write_file(frame, path)
-
-    monkeypatch.setattr(writer, "write_file", full)
-    metrics, watcher = Metrics(), Watcher()
-    recorder = TickRecorder(tmp_path, metrics, GoingClock(NS_PER_S // 10))
-    result = run(LOSSY, overrides=["duration_s=8"], observers=[metrics, recorder, watcher])
-    assert result.ended == "duration"
-    assert result.counts["observer_failed_TickRecorder"] == 1
-    assert len(watcher.truths) == result.ticks == 80
-    errors = capfd.readouterr().err
-    assert "the run continues" in errors
-    assert "No space left on device" in errors
-    ticks = RunFolder(tmp_path).ticks()
-    assert 0 < len(ticks) < 80
-    assert ticks["tick"].to_list() == list(range(len(ticks)))
 
 
 def test_jammed_packets_are_counted_for_sender_receiver_and_link(tmp_path):

@@ -2,9 +2,7 @@
 
 import json
 
-from scipy.stats import binomtest
-
-from swarmwire.deploy import Percentiles, run
+from swarmwire.deploy import run
 from swarmwire.metrics.measures.registry import METRICS, standard_names
 from tests.support.deploy.runs import LOSSY, called
 
@@ -27,17 +25,6 @@ def test_summary_of_the_command_equals_the_result_in_python(tmp_path, monkeypatc
         result.pop(key, None)
     assert summary == result
     assert (tmp_path / "run" / "run.rrd").stat().st_size > 10_000
-
-
-def test_fates_add_up_and_the_loss_is_the_scenarios(tmp_path):
-    radio = run(LOSSY, overrides=["duration_s=20"]).radio
-    assert radio is not None
-    assert isinstance(radio.latency_air_s, Percentiles)
-    assert sum(radio.fates.values()) == radio.intended
-    received, in_range = radio.fates["received"], radio.in_range
-    # False alarm once in 10,000 seeds; the seed is fixed.
-    assert binomtest(received, in_range, 0.7).proportion_ci(0.9999).low < 0.7
-    assert binomtest(received, in_range, 0.7).pvalue > 1e-4
 
 
 def test_several_arenas_have_lists(tmp_path):

@@ -1,56 +1,30 @@
-"""Modules that commands for robots and certificates load: no simulator, and no library for numbers or tables."""
+"""Commands for robots and certificates load no simulator, and no library for numbers or tables."""
 
 import json
-import subprocess
-import sys
 
-HEAVY = {
-    "llvmlite", "matplotlib", "numba", "numpy", "polars", "pymunk", "scipy", "zenoh",
-    "swarmwire.comms.radio", "swarmwire.deploy.campaigns", "swarmwire.deploy.runs", "swarmwire.metrics",
-    "swarmwire.world",
-}  # fmt: skip
-LOADED = """
-import json, sys
-from swarmwire.deploy.cli.app import main
+from tests.integration.deploy.test_loaded_modules import SIMULATOR, loaded_by
 
-results = []
-for arguments in json.loads(sys.argv[1]):
-    sys.argv = ["swarmwire", *arguments]
-    try:
-        main()
-        code = 0
-    except SystemExit as end:
-        code = end.code
-    results.append([arguments[:2], code or 0, sorted(sys.modules)])
-sys.__stdout__.write("\\n" + json.dumps(results))
-"""
+PARTS = {f"swarmwire.{part}" for part in ("comms.radio", "deploy.campaigns", "deploy.runs", "metrics", "world")}
 
 
-def loaded_modules(*commands: list[object]) -> list[tuple[list[str], int, set[str]]]:
-    """Run commands in one process; return for each its name, its exit code and all modules loaded so far."""
-    texts = json.dumps([[str(argument) for argument in command] for command in commands])
-    command = [sys.executable, "-c", LOADED, texts]
-    process = subprocess.run(command, capture_output=True, text=True, check=True, timeout=100)
-    results = json.loads(process.stdout.rpartition("\n")[2])
-    return [(name, code, set(modules)) for name, code, modules in results]
+def modules_of(*commands: list[object]) -> set[str]:
+    """The modules that a process has loaded after these commands."""
+    return loaded_by("\n".join(f"call(*{json.dumps([*map(str, command)])})" for command in commands))
 
 
 def test_commands_for_certificates_load_no_simulator(fleet, tmp_path):
     fleet.add("flock-0")
     folder = tmp_path / "ca"
-    commands = [
-        ["certs", "init", folder],
-        ["certs", "issue", folder, "--fleet", fleet.file],
-        ["certs", "list", folder],
-        ["certs", "revoke", folder, "flock-0"],
-    ]
-    for command, code, modules in loaded_modules(*commands):
-        assert (command, code, modules & HEAVY) == (command, 0, set())
-        assert "asyncssh" not in modules
+    issue = ["certs", "issue", folder, "--fleet", fleet.file]
+    modules = modules_of(
+        ["certs", "init", folder], issue, ["certs", "list", folder], ["certs", "revoke", folder, "flock-0"]
+    )
+    assert not modules & {*SIMULATOR, *PARTS, "asyncssh"}
+    assert "flock-0.pem" in {path.name for path in folder.iterdir()}
 
 
 def test_commands_for_units_of_robots_load_no_simulator(fleet):
     fleet.servers.close(fleet.add("flock-0"))
-    commands = [["robots", name, fleet.file] for name in ("status", "start", "stop", "rollback", "logs")]
-    for command, code, modules in loaded_modules(*commands):
-        assert (command, code, modules & HEAVY) == (command, 1, set())
+    modules = modules_of(*(["robots", name, fleet.file] for name in ("status", "start", "stop", "rollback", "logs")))
+    assert not modules & {*SIMULATOR, *PARTS}
+    assert "asyncssh" in modules

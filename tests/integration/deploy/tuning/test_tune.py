@@ -19,7 +19,7 @@ from swarmwire.deploy.campaigns.tuning.best import gained
 from swarmwire.deploy.campaigns.tuning.study import FILE
 from swarmwire.deploy.cli.actions import tune
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
-from tests.support.deploy.runs import ROOT, called
+from tests.support.deploy.runs import ROOT, called, refused_command
 from tests.support.deploy.tuning import AT, gone_on_with, scenario_in, trials_in, tuned
 from tests.support.refusals import refused_input
 
@@ -231,14 +231,11 @@ def test_tune_command_prints_what_it_found_its_worth_and_what_to_do_next(tmp_pat
     ],
 )
 def test_tune_options_that_are_invalid_are_refused_in_a_line(
-    tmp_path, scenario, typed, monkeypatch, arguments, message
+    tmp_path, scenario, monkeypatch, capsys, arguments, message
 ):
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.iterdir())
-    code, out, errors = typed("tune", *arguments)
-    assert (code, out) == (2, "")
-    assert re.match(f"error: {message}", errors), errors
-    assert errors.count("\n") == 1
+    refused_command(monkeypatch, capsys, "tune", *arguments, match=message)
     assert sorted(tmp_path.iterdir()) == before
 
 

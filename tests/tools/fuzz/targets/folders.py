@@ -9,12 +9,7 @@ from swarmwire.deploy import Recording, Simulation
 from swarmwire.deploy.campaigns.repetition import RepeatedRun
 from swarmwire.deploy.runs.scenario_parts import read_link_traces
 from swarmwire.metrics.pictures.report.run_data import read_run
-from swarmwire.metrics.real.radio_fit.logs import (
-    is_network_table,
-    network_log_of_robots,
-    network_log_of_table,
-    read_log,
-)
+from swarmwire.metrics.real.radio_fit import logs as radio_logs
 from swarmwire.metrics.real.real_log.real_logs import in_step, read_real_logs
 from swarmwire.metrics.real.real_log.truths import real_run
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
@@ -137,7 +132,7 @@ class RadioLogs(FolderTarget):
 
     def read(self, folder: Path, *, deep: bool) -> None:
         for path in sorted(folder.iterdir()):
-            network_log_of_table(path) if is_network_table(path) else read_log(path)
+            (radio_logs.network_log_of_table if radio_logs.is_network_table(path) else radio_logs.read_log)(path)
 
 
 class RobotLogs(FolderTarget):
@@ -157,4 +152,4 @@ class RobotLogs(FolderTarget):
         logs = read_real_logs(folder)
         if deep:
             real_run(in_step(logs))
-            network_log_of_robots(logs)
+            radio_logs.network_log_of_robots(logs)

@@ -64,10 +64,8 @@ class Join(DocumentTarget):
 
     def make_samples(self) -> list[bytes]:
         self.run = small_run()
-        groups = tuple(
-            GroupInfo(group.name, group.agent, SHA256, len(group.rows), group.robot_names)
-            for group in self.run.assignment.groups
-        )
+        own = self.run.assignment.groups
+        groups = tuple(GroupInfo(group.name, group.agent, SHA256, len(group.rows), group.robot_names) for group in own)
         session_info = SessionInfo("small-1", "small", SHA256, "0.1.0", 10, None, groups)
         self.terms = JoinPolicy(session_info=session_info, open=True, memory=self.run.layouts)
         agents = {group.name: SHA256 for group in groups}
@@ -142,13 +140,8 @@ class Control(DocumentTarget):
     refusals = (BadInput,)
 
     def make_samples(self) -> list[bytes]:
-        requests = [
-            ControlRequest("pause"),
-            ControlRequest("resume"),
-            ControlRequest("step", 3),
-            ControlRequest("speed", 2.5),
-            ControlRequest("speed"),
-        ]
+        orders = ("pause",), ("resume",), ("step", 3), ("speed", 2.5), ("speed",)
+        requests = [ControlRequest(*order) for order in orders]
         self.scenario = scenario_from(SCENARIO, "small.toml")
         self.bodies = {group.name: group.body for group in small_run().world.static.groups}
         self._start()

@@ -136,12 +136,8 @@ class Packets(ByteTarget):
         for robot in ROBOTS:
             self.tracker._newest[robot] = (CLOCK.utc_ns(), Pose(1.0, 0.5, 0.1))
         messages = [(Word(number=1.5), BROADCAST), (Other(number=-7), 0), (Word(number=float("nan")), 2)]
-        return [
-            KeyedPacket(
-                KEYS.radio("flock-1", message.tag), PacketHeader(to, 7, CLOCK.utc_ns()).encode() + message.encode()
-            )
-            for message, to in messages
-        ]
+        packets = [(one.tag, PacketHeader(to, 7, CLOCK.utc_ns()).encode() + one.encode()) for one, to in messages]
+        return [KeyedPacket(KEYS.radio("flock-1", tag), data) for tag, data in packets]
 
     def mutated(self, draw: DrawFn) -> Any:
         key, data = pick(draw, self.samples)

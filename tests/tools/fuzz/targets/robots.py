@@ -55,9 +55,8 @@ class Epuck2Commands(ByteTarget):
     name = "epuck2-robot"
 
     def make_samples(self) -> list[bytes]:
-        one, two = (
-            RobotCommand(100, -200, request=flag).encoded() for flag in (PacketRequest.NOTHING, PacketRequest.SENSORS)
-        )
+        requests = PacketRequest.NOTHING, PacketRequest.SENSORS
+        one, two = (RobotCommand(100, -200, request=request).encoded() for request in requests)
         steps = RobotCommand(3, 4, request=PacketRequest.SENSORS, settings=RobotSettingsBits.SET_STEPS).encoded()
         return [one, two, steps, one + two + one + two]
 

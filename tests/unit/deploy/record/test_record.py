@@ -10,14 +10,13 @@ import pytest
 
 from swarmwire.comms.base.clock import WallClock
 from swarmwire.comms.base.errors import BadInput
-from swarmwire.comms.robot.packets import FATE_NAMES, Fate
 from swarmwire.deploy import Simulation, repeat, run
 from swarmwire.deploy.runs.config import Recording
 from swarmwire.deploy.runs.record.folder import RunWriter
 from swarmwire.deploy.runs.record.replay_logs import LiveEventsLog, read_live_events
 from swarmwire.metrics.records.run_folder.layout import LIVE_EVENTS
 from swarmwire.world.live_events import LiveEvent
-from tests.integration.metrics.viewer.test_recording import class_names, column, series
+from tests.integration.metrics.viewer.test_recording import class_names, column
 from tests.support.deploy.joiners import Watcher
 from tests.support.deploy.runs import LOSSY
 from tests.support.refusals import refused_input
@@ -45,45 +44,6 @@ def test_positions_and_who_is_dead_are_the_runs(recorded):
     names, classes = class_names(rrd), column(rrd, "/world/robots", "Points2D:class_ids")
     dead = {tick: sum(names[one][0] == "dead" for one in row) for tick, row in classes.items()}
     assert dead == {0: 0, 40: 4}
-
-
-def test_fates_are_the_runs_own_tally(recorded):
-    rrd, result, ticks = recorded
-    drawn = series(rrd, "packets")
-    seconds = range(RATE_HZ - 1, len(ticks), RATE_HZ)  # each shows the second that ends with it
-    for name, values in drawn.items():
-        fate = FATE_NAMES.index(name.replace(" ", "_"))
-        counts = [int(moment.tally.fates[0, fate]) for moment in ticks]
-        assert sum(values.get(tick, 0.0) for tick in seconds) == sum(counts)
-    received = sum(drawn["received"][tick] for tick in seconds)
-    assert received == result.radio.fates["received"]
-    listed = {name for name, count in result.radio.fates.items() if count and name not in ("in_flight", "out_of_range")}
-    assert {name.replace(" ", "_") for name in drawn} == listed
-
-
-def test_lines_of_lost_packets_are_those_that_the_radio_finished(recorded):
-    rrd, _, ticks = recorded
-    lines = column(rrd, "/world/lost_packets", "LineStrips2D:strips")
-    for moment in ticks:
-        unheard = (moment.finished.fate != Fate.RECEIVED) & (moment.finished.receiver >= 0)
-        assert len(lines.get(moment.tick, [])) == unheard.sum()
-    assert any(lines.values())
-
-
-def test_metrics_end_where_the_summary_says(recorded):
-    rrd, result, ticks = recorded
-    drawn = {name: values for plot in ("shares", "distances", "numbers") for name, values in series(rrd, plot).items()}
-    for name in ("order", "components", "collisions", "min_gap", "largest_component"):
-        assert drawn[name][len(ticks) - 1] == pytest.approx(result.metrics[name].final)
-    order = list(drawn["order"].values())
-    assert np.mean(order) == pytest.approx(result.metrics["order"].mean)
-
-
-def test_events_name_the_robots_of_the_summary(recorded):
-    rrd, result, _ = recorded
-    [event] = result.events
-    lines = column(rrd, "/events", "TextLog:text")
-    assert lines[event.tick] == [f"kill: {', '.join(event.robots[0])}"]
 
 
 RUNS = 4
