@@ -6,7 +6,9 @@ stands for anything. Commands that cannot run here (viewers, make) stand in `tex
 checked. Those below the comment `<!-- needs: module -->` run where the module is installed.
 """
 
+import os
 import re
+import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,6 +23,11 @@ BLOCK = re.compile(
     r"(?:^<!-- (?:file: (?P<file>\S+)|needs: (?P<needs>\S+)) -->\n)?^```(?P<kind>[^\n`]*)\n(?P<text>.*?)^```$",
     re.DOTALL | re.MULTILINE,
 )
+
+
+def environment() -> dict[str, str]:
+    """That of a user who has the programs of the tests' environment."""
+    return {**os.environ, "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])}
 
 
 @dataclass(frozen=True)

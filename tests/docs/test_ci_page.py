@@ -3,9 +3,7 @@
 A hosted runner is needed for `uses:`, the actions of the service, alone.
 """
 
-import os
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -13,7 +11,7 @@ from xml.etree import ElementTree as ET
 import pytest
 import yaml
 
-from tests.docs.pages import ROOT, blocks_of
+from tests.docs.pages import ROOT, blocks_of, environment
 
 [WORKFLOW] = blocks_of("docs/ci.md", "yaml")
 [JOB] = yaml.safe_load(WORKFLOW.text)["jobs"].values()
@@ -23,10 +21,8 @@ INSTALL = "Install"
 
 def ran(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """A step as the service runs it, with the environment of the tests in place of the installed one."""
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    command, environment = ["bash", "-e", "-o", "pipefail", "-c", line], os.environ | {"PATH": path}
-    pipes = {"capture_output": True, "text": True}
-    return subprocess.run(command, cwd=folder, env=environment, timeout=280, check=False, **pipes)
+    command, pipes = ["bash", "-e", "-o", "pipefail", "-c", line], {"capture_output": True, "text": True}
+    return subprocess.run(command, cwd=folder, env=environment(), timeout=280, check=False, **pipes)
 
 
 @pytest.mark.slow

@@ -1,11 +1,9 @@
 """What the page about several machines shows is typed on three of them, as it stands, and prints what is shown."""
 
 import json
-import os
 import re
 import shlex
 import shutil
-import sys
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from swarmwire.deploy import run
-from tests.docs.pages import ROOT, commands_of
+from tests.docs.pages import ROOT, commands_of, environment
 from tests.support.deploy.machines import Machine, Started, machines
 from tests.support.deploy.runs import LOSSY, called
 
@@ -44,8 +42,7 @@ def typed_in(text: str) -> list[Typed]:
 
 def shell(line: str, folder: Path) -> list[str]:
     """The command of a line, in a machine's folder, with the programs of the tests' environment."""
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    return ["env", f"PATH={path}", "sh", "-c", f"cd {folder} && exec {line}"]
+    return ["env", f"PATH={environment()['PATH']}", "sh", "-c", f"cd {folder} && exec {line}"]
 
 
 def new_folder(folder: Path) -> Path:
@@ -71,7 +68,6 @@ def test_machines_page_commands_run_as_shown(page, tmp_path, monkeypatch, capsys
                 shutil.copy(certs / file, folders[name] / "certs")
         started: list[Started] = []
         block = re.search(r"<!-- machines -->\n```text\n(.*?)```", page, re.DOTALL)
-        assert block is not None
         commands = typed_in(block[1])
         for typed in commands:
             command = on[typed.machine].command(*shell(typed.line, folders[typed.machine]))

@@ -19,7 +19,7 @@ from swarmwire.comms.wire.network import Network
 from swarmwire.comms.wire.robot_network import endpoints_of, open_swarm
 from swarmwire.deploy.robots.certificates.folder import begin_authority, issue
 from swarmwire.deploy.robots.certificates.register import certificate_request
-from tests.docs.pages import ROOT
+from tests.docs.pages import ROOT, environment
 from tests.support.clocks import until
 
 PAGE = "docs/robots.md"
@@ -30,10 +30,8 @@ ROBOTS = ("flock-0", "flock-1")
 @contextmanager
 def terminal(line: str) -> Generator[subprocess.Popen[str]]:
     """A shell that is given a line of the page, and Ctrl-C at the end."""
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
-    command, environment = ["bash", "-c", line], {**os.environ, "PATH": path}
-    with subprocess.Popen(command, start_new_session=True, env=environment, **pipes) as process:
+    with subprocess.Popen(["bash", "-c", line], start_new_session=True, env=environment(), **pipes) as process:
         try:
             yield process
         finally:
@@ -44,7 +42,6 @@ def terminal(line: str) -> Generator[subprocess.Popen[str]]:
 
 def read_until(process: subprocess.Popen[str], text: str) -> list[str]:
     """What the process prints, up to the first line with this."""
-    assert process.stdout is not None
     lines = list[str]()
     for line in process.stdout:
         lines.append(line)

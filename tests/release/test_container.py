@@ -96,7 +96,6 @@ def image(tmp_path_factory: pytest.TempPathFactory) -> Stage:
     folder = tmp_path_factory.mktemp("image")
     base = folder / "base"
     suite = re.search(r"debian:(\w+)-slim", (ROOT / "Containerfile").read_text())
-    assert suite is not None
     command = ["debootstrap", "--variant=minbase", suite[1], base]
     made = subprocess.run(command, capture_output=True, text=True, check=False)
     if made.returncode:

@@ -44,7 +44,6 @@ def world(installed: Installed) -> Generator[tuple["Popen[str]", str]]:
     command = [installed.program("swarmwire"), "world", "mine.toml", "--set", "physics.engine=pymunk"]
     command += ["--listen", "tcp/127.0.0.1:0", "--out", "together"]
     with Popen(command, cwd=installed.cwd, env=bare(), stdout=PIPE, stderr=PIPE, text=True) as process:
-        assert process.stdout is not None
         try:
             line = next(line for line in process.stdout if "listens at" in line)
             [endpoint] = re.findall(r"listens at (\S+)[,;]", line)

@@ -168,7 +168,6 @@ def complete(tmp_path_factory):
 def test_killed_run_leaves_a_readable_and_true_folder(tmp_path, complete, moment):
     process = started_in_haste(tmp_path, DURATION, KILL)
     with process:
-        assert process.stdout is not None
         assert any(line.strip() == str(moment) for line in process.stdout)
         process.kill()
     folder = RunFolder(tmp_path)
@@ -195,7 +194,6 @@ def killed(tmp_path_factory):
     process = started_in_haste(folder, "duration_s=3600", rrd=find_spec("rerun") is not None)
     before, due_ns, numbers = None, 0, list[int]()
     with process:
-        assert process.stdout is not None
         ticks = (int(line) for line in process.stdout if line.strip().isdecimal())
         for tick in ticks:
             numbers.append(tick)

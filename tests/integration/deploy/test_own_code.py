@@ -12,7 +12,7 @@ import pytest
 from swarmwire.deploy import RunFolder, Simulation, repeat, run
 from swarmwire.deploy.cli.actions.new import new_swarm
 from swarmwire.metrics.pictures.drawing.film import film_of
-from tests.docs.pages import files_of
+from tests.docs.pages import environment, files_of
 from tests.support.custom_code import CODE, install
 from tests.support.deploy.runs import called, refused_command, run_spread
 from tests.support.refusals import refused_input
@@ -53,15 +53,6 @@ def own_tests(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]
     return python("pytest", "-q", "-p", "no:cacheprovider", *arguments, cwd=folder)
 
 
-def test_new_command_makes_the_folder_and_says_what_to_do_next(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    code, out, errors = called(monkeypatch, capsys, "new", "my_swarm")
-    assert (code, errors) == (0, "")
-    names = {path.name for path in (tmp_path / "my_swarm").iterdir()}
-    assert names == {"agent.py", "scenario.toml", "test_my_swarm.py", "README.md"}
-    assert "swarmwire run my_swarm\n" in out
-
-
 def test_new_project_has_its_name_and_no_placeholders(made):
     for path in made.iterdir():
         assert "$" not in path.read_text()
@@ -69,28 +60,16 @@ def test_new_project_has_its_name_and_no_placeholders(made):
     assert "`test_my_swarm.py`" in (made / "README.md").read_text()
 
 
-def test_new_project_checks_and_runs_as_it_is(made, tmp_path, monkeypatch, capsys):
-    scenario = made / "scenario.toml"
-    checked = called(monkeypatch, capsys, "check", scenario)[1]
-    assert ": 10 x epuck" in checked
-    assert checked.endswith("Hz, engine discs\n")
-    code, out, _ = called(monkeypatch, capsys, "run", scenario, "--set", "duration_s=2", "--out", tmp_path / "out")
-    assert code == 0
-    assert "my_swarm" in out
-    assert (tmp_path / "out" / "summary.json").is_file()
-
-
 @pytest.mark.slow
 @pytest.mark.timeout(400)
 def test_new_project_readme_commands_run_as_they_stand_there(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = new_swarm(Path("my_swarm"))[0].parent
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     lines = [line for line in (folder / "README.md").read_text().splitlines() if line.startswith("swarmwire ")]
     assert len(lines) > 8
     for line in lines:
         pipes = {"capture_output": True, "text": True, "timeout": 200}
-        done = subprocess.run(["sh", "-c", line], cwd=folder, env=os.environ | {"PATH": path}, check=False, **pipes)
+        done = subprocess.run(["sh", "-c", line], cwd=folder, env=environment(), check=False, **pipes)
         assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
     assert (folder / "loss" / "report.html").is_file()
     assert (folder / "film.gif").is_file()

@@ -35,13 +35,37 @@ def every_tick(monkeypatch):
     monkeypatch.setattr(published, "FRAMES_PER_S", NS_PER_S)
 
 
-def publish(folder, run, clock=None):
-    """A published run of these, whose end the caller calls, and its metrics."""
-    metrics = Metrics()
-    observer = Published(folder, "r", metrics, clock or WallClock())
-    metrics.begin(run)
-    observer.begin(run)
-    return metrics, observer
+class PublishedRun:
+    """A run that is published, and a subscription to it; it ends with the block."""
+
+    def __init__(self, folder, run, clock=None):
+        self.run, self.metrics = run, Metrics()
+        self.observer = Published(folder, "r", self.metrics, clock or WallClock())
+        self.metrics.begin(run)
+        self.observer.begin(run)
+        self._subscription = subscribe(live(folder))
+
+    def __enter__(self):
+        self.seen = self._subscription.__enter__()
+        until(self.observer._find_viewer)
+        return self
+
+    def __exit__(self, *error):
+        try:
+            self._subscription.__exit__(*error)
+        finally:
+            self.observer.end(None)
+
+    def tick(self, tick, **fields):
+        """Let the run tick; the truth of it."""
+        now = truth(self.run, tick, **fields)
+        self.metrics.see(now)
+        self.observer.see(now)
+        return now
+
+    def next(self) -> Any:
+        """The next tick that the subscription gets."""
+        return until(self.seen.next)
 
 
 def live(folder):
@@ -49,12 +73,6 @@ def live(folder):
     run = read_live(folder)
     assert run is not None
     return run
-
-
-def next_of(run) -> Any:
-    tick = until(run.next)
-    assert tick is not None
-    return tick
 
 
 def test_nobody_looks_on_and_nothing_is_encoded(tmp_path, monkeypatch, every_tick):
@@ -69,49 +87,34 @@ def test_nobody_looks_on_and_nothing_is_encoded(tmp_path, monkeypatch, every_tic
 
 
 def test_observer_gets_scene_ticks_and_metrics(tmp_path, every_tick):
-    run = static(4, lights=[[]])
-    metrics, observer = publish(tmp_path, run)
-    try:
-        with subscribe(read_live(tmp_path)) as observed:
-            assert observed.scene.static == run
-            assert [series.name for series in observed.metrics] == [metric.name for metric in metrics.metrics]
-            until(observer._find_viewer)
-            for tick in range(5):
-                now = truth(run, tick, pose=np.full((4, 3), tick / 7), edges=edges((0, 3)))
-                metrics.see(now)
-                observer.see(now)
-                got = next_of(observed)
-                assert (got.truth.tick, got.serial, got.ticks) == (tick, tick, 1)
-                assert got.truth.pose.tolist() == now.pose.tolist()
-                assert got.truth.edges is not None
-                assert got.truth.edges.tolist() == [[0, 3]]
-                for name, values in observed.latest.items():
-                    assert np.array_equal(values, metrics.latest[name], equal_nan=True)
-            observer.end(None)
-            until(lambda: observed.next() or observed.over)
-            assert observed.lost == observed.bad == 0
-    finally:
-        assert observer.end(None) == {"published": {"frames": 5, "left_out": 0}}
+    with PublishedRun(tmp_path, static(4, lights=[[]])) as published_run:
+        seen, metrics = published_run.seen, published_run.metrics
+        assert seen.scene.static == published_run.run
+        assert [series.name for series in seen.metrics] == [metric.name for metric in metrics.metrics]
+        for tick in range(5):
+            now = published_run.tick(tick, pose=np.full((4, 3), tick / 7), edges=edges((0, 3)))
+            got = published_run.next()
+            assert (got.truth.tick, got.serial, got.ticks) == (tick, tick, 1)
+            assert got.truth.pose.tolist() == now.pose.tolist()
+            assert got.truth.edges.tolist() == [[0, 3]]
+            for name, values in seen.latest.items():
+                assert np.array_equal(values, metrics.latest[name], equal_nan=True)
+        counts = published_run.observer.end(None)
+        until(lambda: seen.next() or seen.over)
+        assert seen.lost == seen.bad == 0
+    assert counts == {"published": {"frames": 5, "left_out": 0}}
 
 
 def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tmp_path):
-    run, clock = static(2), StillClock()
-    metrics, observer = publish(tmp_path, run, clock)
-    try:
-        with subscribe(read_live(tmp_path)) as observed:
-            until(observer._find_viewer)
-            glimpses = []
-            for tick in range(100):  # a hundredth of a second each
-                kill = (EventRecord(tick, 0.0, "kill", False, np.ones(2, np.bool_)),) if tick == 50 else ()
-                now = truth(run, tick, tally=tally({Fate.RECEIVED: 2}), contact_onsets=np.array([[1, 0]]), events=kill)
-                metrics.see(now)
-                clock.time_ns += NS_PER_S // 100
-                before = observer.frames
-                observer.see(now)
-                if observer.frames > before:
-                    glimpses.append(next_of(observed))
-    finally:
-        observer.end(None)
+    clock, glimpses = StillClock(), list[Any]()
+    with PublishedRun(tmp_path, static(2), clock) as published_run:
+        for tick in range(100):  # a hundredth of a second each
+            kill = (EventRecord(tick, 0.0, "kill", False, np.ones(2, np.bool_)),) if tick == 50 else ()
+            clock.time_ns += NS_PER_S // 100
+            before = published_run.observer.frames
+            published_run.tick(tick, tally=tally({Fate.RECEIVED: 2}), contact_onsets=np.array([[1, 0]]), events=kill)
+            if published_run.observer.frames > before:
+                glimpses.append(published_run.next())
     last = glimpses[-1].truth.tick
     assert len(glimpses) == 25  # every fourth tick is the first after a thirtieth of a second
     assert sum(glimpse.ticks for glimpse in glimpses) == last + 1
@@ -121,42 +124,29 @@ def test_frames_come_thirty_a_second_and_nothing_that_adds_up_is_lost_between(tm
 
 
 def test_ticks_that_find_the_sender_busy_are_left_out_and_counted(tmp_path, monkeypatch, every_tick):
-    run, go = static(2), threading.Event()
-    monkeypatch.setattr(published, "encode_truth", lambda glimpse: go.wait() and encode_truth(glimpse))
-    metrics, observer = publish(tmp_path, run)
-    try:
-        with subscribe(read_live(tmp_path)) as observed:
-            until(observer._find_viewer)
-            for tick in range(20):
-                metrics.see(now := truth(run, tick, tally=tally({Fate.RECEIVED: 1})))
-                observer.see(now)
-            go.set()
-            assert observer.frames + observer.left_out == 20
-            assert 1 <= observer.frames <= 2
-            got = [next_of(observed) for _ in range(observer.frames)]
-            until(observer._frames.empty)
-            metrics.see(now := truth(run, 20, tally=tally({Fate.RECEIVED: 1})))
-            observer.see(now)
-            got.append(next_of(observed))
-            assert sum(glimpse.truth.tally.fates[0, Fate.RECEIVED] for glimpse in got if glimpse.truth.tally) == 21
-    finally:
+    go = threading.Event()
+    monkeypatch.setattr(published, "encode_truth", lambda glimpse: go.wait(20.0) and encode_truth(glimpse))
+    with PublishedRun(tmp_path, static(2)) as published_run:
+        observer = published_run.observer
+        for tick in range(20):
+            published_run.tick(tick, tally=tally({Fate.RECEIVED: 1}))
         go.set()
-        observer.end(None)
+        assert observer.frames + observer.left_out == 20
+        assert 1 <= observer.frames <= 2
+        got = [published_run.next() for _ in range(observer.frames)]
+        until(observer._frames.empty)
+        published_run.tick(20, tally=tally({Fate.RECEIVED: 1}))
+        got.append(published_run.next())
+        assert sum(glimpse.truth.tally.fates[0, Fate.RECEIVED] for glimpse in got if glimpse.truth.tally) == 21
 
 
 def test_error_of_the_sender_ends_the_publishing_not_the_run(tmp_path, monkeypatch, every_tick):
     monkeypatch.setattr(published, "encode_truth", lambda _: 1 / 0)
-    metrics, observer = publish(tmp_path, run := static(2))
-    try:
-        with subscribe(read_live(tmp_path)):
-            until(observer._find_viewer)
-            metrics.see(truth(run))
-            observer.see(truth(run))
-            until(lambda: observer._fault)
-            with pytest.raises(ZeroDivisionError):
-                observer.see(truth(run, 1))
-    finally:
-        observer.end(None)
+    with PublishedRun(tmp_path, static(2)) as published_run:
+        published_run.tick(0)
+        until(lambda: published_run.observer._fault)
+        with pytest.raises(ZeroDivisionError):
+            published_run.observer.see(truth(published_run.run, 1))
     assert read_live(tmp_path) is None
 
 
@@ -222,12 +212,9 @@ def test_published_run_listens_on_no_network(tmp_path):
         return [c for c in psutil.Process().net_connections("inet") if c.status == psutil.CONN_LISTEN]
 
     before = listening()  # of the tests' own tools
-    _, observer = publish(tmp_path, static(2))
-    try:
+    with PublishedRun(tmp_path, static(2)):
         assert live(tmp_path).endpoint.startswith("unixsock-stream/")
         assert listening() == before
-    finally:
-        observer.end(None)
 
 
 def test_live_file_of_a_killed_run_is_not_believed(tmp_path):
@@ -250,7 +237,6 @@ def test_paused_run_shows_its_newest_tick_to_each_new_observer(tmp_path):
         for _ in range(2):  # the second begins to look on in the middle, after the first has gone
             with subscribe(read_live(tmp_path)) as run:
                 glimpse = until(lambda run=run: looked(run))
-                assert glimpse is not None
                 ticks.append(glimpse.truth.tick)
             until(lambda: shown.catch_up() or not shown._has_viewer)
 

@@ -108,7 +108,6 @@ def world(folder: Path, *arguments: str | Path) -> Generator["subprocess.Popen[s
 
 def listens_at(process: "subprocess.Popen[str]") -> tuple[str, str]:
     """Where a world listens, and what it says is to be typed elsewhere."""
-    assert process.stdout is not None
     line = process.stdout.readline()
     while "listens at" not in line:
         assert line, process.stderr and process.stderr.read()
@@ -126,7 +125,6 @@ def test_join_from_two_terminals_makes_the_same_run_as_one(tmp_path):
         join = [sys.executable, "-m", "swarmwire.agent.cli", "join", endpoint, "--robots", "5"]
         first = subprocess.Popen(join, stderr=subprocess.PIPE, text=True)
         try:
-            assert process.stdout is not None
             assert process.stdout.readline().startswith("0 of 20 robots have agents; without: flock-0")
             assert process.stdout.readline().startswith("5 of 20 robots have agents; without: flock-5")
             second = swarmwire("join", endpoint, "--scenario", LOSSY, "--processes", "3")
@@ -140,7 +138,6 @@ def test_join_from_two_terminals_makes_the_same_run_as_one(tmp_path):
     assert out.startswith("20 of 20 robots have agents\n")
     assert len(re.findall(r" joined with .* before the first tick", errors)) == 2
     summary = RunFolder(folder).summary
-    assert summary is not None
     assert summary["trajectory_sha256"] == run(LOSSY, overrides=["duration_s=2"]).trajectory_sha256
     assert [change["what"] for change in summary["runner_events"]] == ["joined", "joined"]
     assert repeat(folder).same

@@ -49,7 +49,6 @@ def viewing(*arguments):
     """`swarmwire view` in a browser, once it has said where, with that address."""
     command = [sys.executable, "-m", "swarmwire.deploy", "view", "--web", *map(str, arguments)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
         try:
             line = process.stderr.readline()
             match = re.search(r"http://127\.0\.0\.1:\d+/\S+/", line)
@@ -97,7 +96,6 @@ def rerun_elsewhere():
     """Rerun's program as the child of a process, with what it said: its pid, its address and its port."""
     command = [sys.executable, "-c", RERUN]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as parent:
-        assert parent.stdout is not None
         try:
             pid, host, port = parent.stdout.readline().split()
             yield parent, psutil.Process(int(pid)), host, int(port)

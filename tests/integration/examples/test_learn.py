@@ -20,7 +20,6 @@ def test_shipped_policies_drive_the_robots_of_their_scenario(policy: Path) -> No
     overrides = [f"robots.{group}.agent={policy}", f"robots.{group}.params={{}}", "duration_s=10", 'metrics=["speed"]']
     result = run(LEARN / f"{task}.toml", overrides=overrides)
     assert (result.metrics["speed"].mean or 0.0) > 0.03
-    assert result.radio is not None
     assert result.radio.fates["received"] > 0
 
 

@@ -61,7 +61,6 @@ class DrivenRobots:
 
     def __init__(self, simulation: Simulation, radio: str | None, broken: bool, together: bool = True) -> None:
         """`together`: the run waits until all are connected, which a Crazyflie, whose logs come at ticks, never is."""
-        assert simulation.served is not None
         self._end, self._broken = StopFlag(), broken
         chosen = {} if radio is None else {"radio.kind": radio}
         self._robots = {robot.file: chosen for robot in simulation.served.robots if robot.file}

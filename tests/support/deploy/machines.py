@@ -178,7 +178,6 @@ class Started:
         self._reading.start()
 
     def _read(self) -> None:
-        assert self.process.stdout is not None
         for line in self.process.stdout:
             self._arrived.put(line.rstrip("\n"))
         self._arrived.put(None)
@@ -193,7 +192,6 @@ class Started:
         finally:
             started.process.kill()
             started.process.wait()
-            assert started.process.stdout is not None
             started.process.stdout.close()
 
     def next_line(self, *texts: str) -> str:

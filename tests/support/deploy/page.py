@@ -27,7 +27,6 @@ def paged(scenario: Path, out: Path, *options: str) -> Generator[tuple["subproce
     """`swarmwire run --ui`, once it has told the page's address; whatever it started ends with the block."""
     command = [sys.executable, "-m", "swarmwire.deploy", "run", str(scenario), "--ui", "--out", str(out), *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
-        assert process.stdout is not None
         try:
             text = ""
             while (match := re.search(r"open (http://127\.0\.0\.1:\d+/\S+/) in a browser", text)) is None:

@@ -87,7 +87,6 @@ def started(*arguments: str | Path) -> subprocess.Popen[str]:
     """A run that has begun to tick."""
     command = [sys.executable, "-m", "swarmwire.deploy", "run", *map(str, arguments)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout is not None
     first = process.stdout.readline()
     if first.startswith("compiling"):
         first = process.stdout.readline()
@@ -160,7 +159,6 @@ def watcher(folder: Path) -> Generator[subprocess.Popen[str]]:
     """A process that looks on at the run in this folder, and prints what it saw when that is over."""
     with subprocess.Popen([sys.executable, "-c", WATCHER, str(folder)], stdout=subprocess.PIPE, text=True) as process:
         try:
-            assert process.stdout is not None
             assert process.stdout.readline() == "looking\n"
             yield process
         finally:

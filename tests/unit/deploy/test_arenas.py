@@ -105,7 +105,6 @@ def test_record_of_a_run_holds_heights_boundary_and_floor(tmp_path: Path):
 
 def test_robots_go_round_a_torus_and_are_received_across_its_seam(tmp_path: Path, around: Path):
     result = run(around, out=tmp_path / "run")
-    assert result.radio is not None
     assert (result.radio.link_pdr or 0.0) > 0.99
     ticks = RunFolder(tmp_path / "run").robots()
     xy = ticks.select("x_m", "y_m").to_numpy().reshape(-1, 12, 2)
@@ -142,7 +141,6 @@ def test_shipped_links_are_cut_between_halves_when_the_file_says():
     with Simulation(REPLAYED) as simulation:
         while simulation.tick < 450:
             finished = simulation.step().finished
-            assert finished is not None
             is_across = (finished.sender < 3) != (finished.receiver < 3)
             during = (finished.on_air_at_ns >= 20 * NS_PER_S) & (finished.on_air_at_ns < 40 * NS_PER_S)
             is_received = finished.fate == Fate.RECEIVED
@@ -165,7 +163,6 @@ def test_signals_have_the_strengths_of_the_file(tmp_path: Path):
     with Simulation(tmp_path / "walled.toml", overrides=radio) as simulation:
         while simulation.tick < 25:
             finished = simulation.step().finished
-            assert finished is not None
             assert finished.rssi_dbm is not None
             assert set(zip(finished.sender.tolist(), finished.receiver.tolist(), strict=True)) <= {(1, 4)}
             for on_air_ns, rssi_dbm in zip(finished.on_air_at_ns, finished.rssi_dbm, strict=True):
@@ -207,7 +204,6 @@ def test_csv_and_parquet_are_read_by_name(tmp_path):
         traces = read_link_traces(path, ROBOTS)
         assert traces.rssi_dbm is traces.delay_s is None
         links = np.array([2, 2, 0]), np.array([0, 0, 2]), np.array([499_999_999, 500_000_000, 500_000_000])
-        assert traces.delivery_ratio is not None
         assert traces.delivery_ratio.values_at(*links) == pytest.approx([0.25, 1.0, np.nan], nan_ok=True)
 
 
@@ -218,7 +214,6 @@ def test_link_traces_have_the_values_of_their_rows_per_quantity(tmp_path):
     assert traces.delivery_ratio is None
     sender, receiver, at_ns = np.array([0, 0, 1]), np.array([1, 1, 0]), np.array([0, 10**9, 10**9])
     for trace, expected in ((traces.delay_s, [0.5, 0.5, np.nan]), (traces.rssi_dbm, [np.nan, -60.0, np.nan])):
-        assert trace is not None
         assert trace.values_at(sender, receiver, at_ns) == pytest.approx(expected, nan_ok=True)
     assert traces.has_values(sender, receiver, at_ns).tolist() == [True, True, False]
 

@@ -95,7 +95,6 @@ def test_recorded_tables_equal_the_observers_view_and_the_summary(tmp_path):
             assert ticks[name].to_list()[-1] == statistics.final
         counted = recorded.packets(arena).group_by("fate").agg(pl.col("receivers").sum()).rows()
         radio = of_arena.radio
-        assert radio is not None
         without_rows = (FATE_NAMES[Fate.OUT_OF_RANGE], FATE_NAMES[Fate.IN_FLIGHT])
         assert dict(counted) == {f: n for f, n in radio.fates.items() if n and f not in without_rows}
         assert {"received", "lost", "blackout"} <= dict(counted).keys()
@@ -119,7 +118,6 @@ def test_tables_of_packets_and_radio_are_the_same_in_every_layout(tmp_path, scen
         return folder.packets(arena).drop("arena").sort("sender", "sequence", "receiver", maintain_order=True)
 
     alone, parts, others = recorded("alone", seed=3), recorded("parts", 3, seed=3), recorded("others", seeds=[9, 3])
-    assert alone.summary is not None
     assert alone.summary["record"]["packets"]["share"] == 0.1
     assert 0 < len(packets(alone)) < 0.2 * alone.summary["radio"]["intended"]
     assert packets(alone).equals(packets(parts))
@@ -134,7 +132,6 @@ def test_jammed_packets_are_counted_for_sender_receiver_and_link(tmp_path):
     radio = run(JAMMED, overrides=short, out=tmp_path / "run", record=record).radio
     folder = RunFolder(tmp_path / "run")
     robots, links = folder.radio_robots(), folder.radio_links()
-    assert radio is not None
     jammed = radio.fates["jammed"]
     assert jammed > 0
     assert robots["as_sender_jammed"].sum() == robots["as_receiver_jammed"].sum() == jammed
@@ -150,7 +147,6 @@ def test_recorded_packets_include_those_of_a_tick_that_failed(tmp_path):
         run(LOSSY, overrides=overrides, out=tmp_path / "run", record=record)
     folder = RunFolder(tmp_path / "run")
     summary = folder.summary
-    assert summary is not None
     assert (summary["ended"], summary["ticks"]) == ("failed", 5)
     received, tables = pl.col("fate") == "received", (folder.packets(), folder.radio_links())
     counts = len(tables[0].filter(received)), tables[1].filter(received)["packets"].sum()
@@ -187,6 +183,5 @@ def test_links_without_a_place_for_them_are_refused():
 def test_radio_presets_all_carry_a_flock(preset: str):
     radio = f'radio={{preset="{preset}",measures={{range={{}},bearing={{}}}},max_payload_bytes=6}}'
     result = run(SIGNALS, overrides=["duration_s=1", "robots.flock.count=5", radio])
-    assert result.radio is not None
     assert result.radio.sent > 40
     assert sum(result.radio.fates.values()) == result.radio.intended == 4 * result.radio.sent

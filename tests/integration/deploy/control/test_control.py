@@ -133,7 +133,6 @@ def _is_gone(control: RemoteControl) -> bool:
 def test_nobody_answers_for_a_run_that_is_over(tmp_path):
     with going(tmp_path / "run", "duration_s=1") as (simulation, control):
         live = read_live(tmp_path / "run")
-        assert live is not None
         assert only_run_at(live.endpoint) == simulation.run_id
         control.stop()
         until(lambda: read_live(tmp_path / "run") is None)
@@ -169,7 +168,6 @@ def test_interactive_session_is_repeated_bit_for_bit_in_another_layout(tmp_path)
     with going(tmp_path / "run", SHORT) as (simulation, control):
         session_of_people(control)
     result = simulation.result
-    assert result.live_events is not None
     assert result.live_events.lines == 9 + 1  # and the loss that was set before ends
     assert result.trajectory_sha256 != run(LOSSY, overrides=[SHORT]).trajectory_sha256
     repetition = repeat(tmp_path / "run", runners=3, out=tmp_path / "again")

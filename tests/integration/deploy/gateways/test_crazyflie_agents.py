@@ -51,7 +51,6 @@ def test_crazyflie_agents_send_packets_over_the_robots_own_network(tmp_path: Pat
         world = subprocess.Popen([*run, *out], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         closing.callback(world.communicate)
         closing.callback(world.send_signal, signal.SIGINT)
-        assert world.stdout is not None
         assert any(line.startswith("cf-1") for line in world.stdout)
         for name in ("cf-0", "cf-1"):
             config = ("--config", str(tmp_path / "run" / "robots" / f"{name}.toml"))

@@ -41,7 +41,6 @@ class Fates(Observer):
         self.out_of_range: list[int] = []
 
     def see(self, truth: Truth) -> None:
-        assert truth.tally is not None
         self.distance_m.append(distance_m(truth.pose))
         self.received.append(int(truth.tally.fates[0, Fate.RECEIVED]))
         self.out_of_range.append(int(truth.tally.fates[0, Fate.OUT_OF_RANGE]))
@@ -75,11 +74,9 @@ def test_robots_of_a_hall_are_out_of_range_in_the_radio_of_another_run_once_they
     fates, end = Fates(), StopFlag()
     hall = Simulation(HALL, gateways=Gateways({"": "epuck2"}, swarm="hall"), out=tmp_path / "hall", record=BARE)
     with hall, running(hall), ThreadPoolExecutor(2) as pool:
-        assert hall.served is not None
         overrides = [f"radio.range_m={RANGE_M}", f'robots.hall.motion.connect=["{hall.served.endpoints[0]}"]']
         options = {"out": tmp_path / "air", "record": BARE, "overrides": overrides, "observers": [fates]}
         with Simulation(AIR, gateways="radio-only", **options) as air:
-            assert air.served is not None
             air.run(1)  # in the first tick robots are where the scenario places them
             files = [robot.file for robot in air.served.robots]
             addresses = [robot.address for robot in hall.served.robots]
@@ -108,13 +105,11 @@ def test_settings_of_robots_elsewhere_have_neither_a_driver_nor_the_limits_of_em
     monkeypatch.setattr(serving, "GRACE_S", 0.01)  # wall time: from then on robots that no program drives are reported
     options = {"realtime": 100.0, "out": tmp_path / "run", "record": BARE}
     with Simulation(scenario, gateways={"other": "radio-only"}, **options) as simulation:
-        assert simulation.served is not None
         robot = simulation.served.robots[0]
         simulation.run()
     assert "no program" not in capsys.readouterr().err
     assert not {"driver", "max_linear_mps", "max_angular_radps"} & set(robot.settings)
     assert robot.settings["radio"]["kind"] == "world"
-    assert robot.command is not None
     assert robot.command.endswith("robots/other-0.toml --driver NAME --address ADDRESS")
     with refused_input(match="driver"):
         read_settings(robot.file, {})

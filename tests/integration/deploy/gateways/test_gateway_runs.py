@@ -53,7 +53,6 @@ def test_summary_names_real_time_and_the_gateways(scenario, scripted, tmp_path) 
     assert (result.mode, result.facts.gateways) == ("realtime", {"other": "scripted"})
     facts = summary["mode"], summary["gateways"], summary["realtime"]["factor"]
     assert facts == ("realtime", {"other": "scripted"}, FAST)
-    assert result.inputs is not None
     assert (result.inputs.first_tick, result.inputs.ticks) == (0, 20)
 
 
@@ -71,7 +70,6 @@ def test_gateway_run_is_repeated_bit_for_bit_without_its_gateways(scenario, scri
 
 def test_settings_of_each_robot_are_left_in_the_run_folder(scenario, scripted, tmp_path) -> None:
     simulation = driven(scenario, scripted, tmp_path / "run")
-    assert simulation.served is not None
     robot = simulation.served.robots[1]
     file = tmp_path / "run" / "robots" / "other-1.toml"
     assert robot.file == file
@@ -135,9 +133,7 @@ def test_with_a_subtick_it_is_repeated_bit_for_bit_too(scenario, scripted, tmp_p
         scripted[-1].drive = {1: (0.0, 1.0)}
         simulation.run()
     result = simulation.result
-    assert result.realtime is not None
     assert result.realtime.subtick_s == 0.002
-    assert result.radio is not None
     assert sum(result.radio.fates.values()) == result.radio.intended > 0
     repetition = repeat(folder)
     assert repetition.same
@@ -167,7 +163,6 @@ def test_flock_behind_a_gateway_finds_one_heading(body) -> None:
     assert (result.metrics["order"].min or 0.0) < 0.8
     assert final(result, "order") > 0.9
     assert final(result, "largest_component") == 1.0
-    assert result.radio is not None
     assert result.radio.link_pdr == pytest.approx(0.9, abs=0.01)
 
 
@@ -220,7 +215,6 @@ def test_printed_command_drives_the_robot(tmp_path) -> None:
     command = [sys.executable, "-m", "swarmwire.deploy", "run", SCENARIO, "--gateway", "epuck2", "--realtime=2"]
     more = ["--set", "robots.flock.count=2", "--out", tmp_path / "run", "--no-rrd"]
     with subprocess.Popen([*command, *more], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as run:
-        assert run.stdout is not None
         try:
             line = next(line for line in run.stdout if line.startswith("flock-1"))
             program, *arguments = line.split()[3:]

@@ -106,7 +106,6 @@ class BehindRouter(Joiners):
         self.start("r1")
 
     def send_router(self, number: signal.Signals) -> None:
-        assert self.router is not None
         self.router.process.send_signal(number)
 
     def freeze_router(self) -> None:

@@ -292,7 +292,6 @@ def test_tuning_that_is_killed_leaves_no_worker_and_can_be_resumed(tmp_path, typ
     code, out, _ = typed("tune", "--resume", folder)
     match = re.search(r"5 trials x 1 seeds; (\d) of them are there", out)
     assert code == 0
-    assert match is not None
     assert int(match[1]) >= 3
     tuned(scenario, tmp_path / "whole", seeds=1, trials=5, parallel_trials=2)
     assert trials_in(folder).equals(trials_in(tmp_path / "whole"), null_equal=True)

@@ -262,7 +262,6 @@ def openssh(home: Path, client_key: asyncssh.SSHKey) -> Generator[FakeHost]:
     finally:
         process.terminate()
         process.wait(10)
-        assert process.stderr
         process.stderr.close()
         host.end_units()
 
@@ -282,5 +281,4 @@ def _wait(port: int, process: "subprocess.Popen[str]") -> None:
         except ConnectionRefusedError:
             continue
         return
-    assert process.stderr
     pytest.skip(f"sshd does not start: {process.stderr.read().strip()}")

@@ -112,23 +112,6 @@ def lines(folder):
     return [json.loads(line) for line in (folder / LIVE_EVENTS).read_text().splitlines()]
 
 
-def test_paused_means_that_the_tick_stands_still_and_steps_are_so_many_ticks(tmp_path):
-    with going(tmp_path / "run", SHORT) as (simulation, control):
-        assert control.pause()["done"] == "paused"
-        assert control.status()["state"] == "paused"
-        control.step(3)
-        assert at_tick(control, 3)["state"] == "paused"
-        control.step(2)
-        control.step()
-        at_tick(control, 6)
-        paused = {control.status()["tick"] for _ in range(20)}
-        assert paused == {6}
-        assert "100 times" in control.speed(100)["done"]
-        control.resume()
-        until(lambda: simulation.tick > 6)
-    assert simulation.result.ended == "duration"
-
-
 def test_live_event_takes_effect_next_tick_and_is_recorded_before(tmp_path):
     with going(tmp_path / "run", SHORT) as (simulation, control):
         control.step(3)

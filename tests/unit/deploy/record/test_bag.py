@@ -160,8 +160,6 @@ def test_bag_opens_as_a_bag_with_rising_times_and_all_frames_below_the_map(recor
         mcap = make_reader(file)
         summary, order = mcap.get_summary(), [row[2].log_time for row in mcap.iter_messages(log_time_order=False)]
         assert mcap.get_header().profile == "ros2"
-    assert summary is not None
-    assert summary.statistics is not None
     assert summary.statistics.message_count == len(read) == len(order)
     assert {channel.message_encoding for channel in summary.channels.values()} == {"cdr"}
     assert order == sorted(order)
