@@ -35,9 +35,9 @@ def status_of(clock: Clock, compiling: CompileTime) -> Status:
     metrics = Metrics([])
     metrics.begin(static(2))
     names = {"run_id": "r", "scenario": "s", "ticks": 9}
-    told = {"health": lambda: None, "counts": dict, "radio": lambda: None, "events": list}
+    callbacks = {"health": lambda: None, "counts": dict, "radio": lambda: None, "events": list}
     controls = Controls(clock, 10)
-    return Status(metrics=metrics, controls=controls, clock=clock, compiled_ns=compiling.total_ns, **names, **told)
+    return Status(metrics=metrics, controls=controls, clock=clock, compiled_ns=compiling.total_ns, **names, **callbacks)
 
 
 @pytest.mark.parametrize("tick", [0, 1, 2])

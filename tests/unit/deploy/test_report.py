@@ -89,7 +89,8 @@ def test_comparison_is_printed_and_written(monkeypatch, capsys, tmp_path, folder
 
 @pytest.mark.parametrize("arguments", [("--response", "ordr"), ("--to", "x.txt")])
 def test_compare_with_bad_arguments_prints_one_line_and_exits_with_2(typed, folders, arguments):
-    refused_command(*typed, "compare", *folders, *arguments)
+    code, _, errors = called(*typed, "compare", *folders, *arguments)
+    assert (code, errors[:7], errors.count("\n")) == (2, "error: ", 1)
 
 
 def test_comparison_table_is_no_wider_than_the_terminal(folders):

@@ -224,8 +224,8 @@ def endpoint(certs, controls) -> Iterator[str]:
     """Where the run `r`, which takes nothing but what controls know, is controlled from elsewhere."""
     keys, world = ObserverKeys("r"), member("world", certs=certs)
     names = {"run_id": "r", "scenario": "s", "ticks": 9}
-    told = {"health": lambda: None, "counts": dict, "radio": lambda: None, "events": list}
-    status = Status(metrics=Metrics(), controls=controls, clock=WallClock(), **names, **told)
+    callbacks = {"health": lambda: None, "counts": dict, "radio": lambda: None, "events": list}
+    status = Status(metrics=Metrics(), controls=controls, clock=WallClock(), **names, **callbacks)
     status.begin(static(2))
     assert world.access is not None
     opened = open_observed("tls/127.0.0.1:0", world.network, observers_access(keys, world.access))

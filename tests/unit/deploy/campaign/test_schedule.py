@@ -55,8 +55,8 @@ FIXED = {"series": True, "batch": None, "realtime": None, "max_late": 0.01, "var
 
 def made(points, seeds, robots=10, recorded=(), duration_s=60.0):
     overrides = [(f"a={point}",) for point in range(points)]
-    given = {"seeds": tuple(range(1, seeds + 1)), "robots": robots, "record_seeds": recorded, "duration_s": duration_s}
-    return Made(points=[{}] * points, point_overrides=overrides, **given, **FIXED)
+    fields = {"seeds": tuple(range(1, seeds + 1)), "robots": robots, "record_seeds": recorded, "duration_s": duration_s}
+    return Made(points=[{}] * points, point_overrides=overrides, **fields, **FIXED)
 
 
 def tasks(campaign, done=(), batch=None, workers=2):
