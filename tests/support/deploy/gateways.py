@@ -52,8 +52,8 @@ range_m = 1.5
 measures = { range = {}, bearing = {} }
 """
 COUNTS = ("collisions", "wall_contacts")
-METRICS = {"mean order": "mean", "min_gap": "mean"}  # by the value that counts
-METRICS |= dict.fromkeys(("order", "target_best", "target_mean", *COUNTS), "final")
+FINAL = ("order", "target_best", "target_mean", *COUNTS)
+METRICS = {"mean order": "mean", "min_gap": "mean", **dict.fromkeys(FINAL, "final")}  # by the value that counts
 
 
 class DrivenRobots:

@@ -242,11 +242,11 @@ def test_tune_options_that_are_invalid_are_refused_in_a_line(
 class Interrupting(NoObserver):
     """Presses Ctrl-C after the third trial."""
 
-    def begin(self, *_):
+    def begin(self, *_, **__):
         pass
 
-    def see(self, trial):
-        if trial.number == 2:
+    def see(self, result):
+        if result.number == 2:
             os.kill(os.getpid(), signal.SIGINT)
 
 

@@ -298,7 +298,7 @@ def test_speed_is_unknown_while_kernels_are_compiled(control, news):
 
 
 def test_token_differs_for_each_page():
-    calls = []
+    calls, address = [], ""
 
     def app(token, port):
         calls.append((token, port))
