@@ -15,14 +15,10 @@ from tests.tools.soak.site import Site, Target
 
 PART = 0.1  # share of the runners that die at once, as with a machine
 
-RUNNER_TROUBLES = {
-    **{"runner_killed": 5, "agent_killed": 4, "many_killed": 1, "runner_leaves": 2},
-    **{"runner_frozen": 3, "runner_frozen_too_long": 1, "runner_slowed": 2},
-}
-WORLD_TROUBLES = {
-    **{"world_frozen": 1, "paused": 1, "stranger_refused": 1, "robots_killed": 2},
-    **{"loss_set": 2, "parted": 1, "pushed": 1, "order_refused": 1},
-}
+_RUNNER_FROZEN = {"runner_frozen": 3, "runner_frozen_too_long": 1, "runner_slowed": 2}
+RUNNER_TROUBLES = {"runner_killed": 5, "agent_killed": 4, "many_killed": 1, "runner_leaves": 2, **_RUNNER_FROZEN}
+_ORDERS = {"robots_killed": 2, "loss_set": 2, "parted": 1, "pushed": 1, "order_refused": 1}
+WORLD_TROUBLES = {"world_frozen": 1, "paused": 1, "stranger_refused": 1, **_ORDERS}
 OBSERVER_TROUBLES = {"observer_killed": 4, "observer_frozen": 2}
 WEIGHTS = RUNNER_TROUBLES | WORLD_TROUBLES | OBSERVER_TROUBLES
 

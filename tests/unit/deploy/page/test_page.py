@@ -298,7 +298,7 @@ def test_speed_is_unknown_while_kernels_are_compiled(control, news):
 
 
 def test_token_differs_for_each_page():
-    calls, address = [], ""
+    calls = []
 
     def app(token, port):
         calls.append((token, port))
@@ -310,7 +310,7 @@ def test_token_differs_for_each_page():
             assert len(token) >= 32
     assert calls[0][0] != calls[1][0]
     with pytest.raises(urllib.error.URLError):  # the server ends with its block
-        urllib.request.urlopen(address, timeout=5)
+        urllib.request.urlopen(f"http://127.0.0.1:{calls[-1][1]}/", timeout=5)
 
 
 FOUR, NINE = static(robots=4), static(robots=9)
