@@ -68,6 +68,13 @@ def test_normal_passes_kolmogorov_smirnov() -> None:
     assert stats.kstest(draws.normal(KEY, 0, MANY, 0, 0), "norm").pvalue > 1e-3
 
 
+def test_normal_has_the_moments_of_the_standard_normal() -> None:
+    """Each within 4 standard errors, false alarm 1 in 4000 for the four together."""
+    x = draws.normal(KEY, 0, 0, MANY, 0)
+    for power, moment, variance in ((1, 0, 1), (2, 1, 2), (3, 0, 15), (4, 3, 96)):
+        assert abs(np.mean(x**power) - moment) < 4.0 * np.sqrt(variance / len(x))
+
+
 @pytest.mark.parametrize("word", range(4))
 def test_uniform_of_neighbouring_counters_is_uncorrelated(word: int) -> None:
     """4 standard errors, false alarm 1 in 16000."""
@@ -135,3 +142,9 @@ def test_key_of_numpy_scalars_equals_that_of_python_values() -> None:
     key = draws.derive_key(1, "robot", 0)
     assert (type(key), 0 <= key < 2**64) == (int, True)
     assert draws.derive_key(np.int64(1), np.str_("robot"), np.uint8(0)) == key
+
+
+def test_purposes_are_distinct_32_bit_words() -> None:
+    words = [draws.purpose(name) for name in ("", "loss", "jitter", "Loss", "proximity noise")]
+    assert len(set(words)) == len(words)
+    assert all(0 <= word < 2**32 for word in words)

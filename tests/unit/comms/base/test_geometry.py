@@ -28,6 +28,7 @@ from swarmwire.comms.base.geometry.robot_index import (
 )
 from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.base.kernels import njit
+from tests.support.comms.lines import indexed, is_blocked_on_floor
 
 SIDES = st.floats(0.1, 50.0)
 SIZE_M = (4.0, 2.0)
@@ -75,7 +76,9 @@ def test_cells_around_a_robot_list_all_within_reach_once(
 
 
 @given(st.integers(0, 2**32 - 1), st.lists(st.booleans(), min_size=1, max_size=4), st.integers(0, 20), st.booleans())
-def test_grid_sorts_robots_of_running_arenas_by_cell(seed: int, are_running: list[bool], robots: int, clamps: bool):
+def test_grid_sorts_robots_of_running_arenas_by_cell(
+    seed: int, are_running: list[bool], robots: int, clamps: bool
+) -> None:
     arenas, running = len(are_running), np.array(are_running)
     state = np.random.default_rng(seed).uniform(-3.0, 3.0, (arenas, robots, 6))
     grid = grid_over((4.0, 3.0), 0.7, arenas, arenas * robots, clamps)
@@ -217,6 +220,12 @@ def test_ray_along_the_sides_of_a_box(x: float, y: float, dx: float, dy: float, 
     assert ray_to(Obstacle("box", 0.0, 0.0, size_m=(2.0, 1.0)), x, y, dx, dy) == expected
 
 
+def test_line_of_sight_is_equal_in_both_directions() -> None:
+    obstacles = indexed(ARENAS, OBSTACLE_ARENA_M)
+    for x0, y0, x1, y1 in np.random.default_rng(3).uniform(-3.0, 3.0, (500, 4)):
+        assert is_blocked_on_floor(obstacles, 0, x0, y0, x1, y1) == is_blocked_on_floor(obstacles, 0, x1, y1, x0, y0)
+
+
 def test_obstacle_arrays_are_grouped_by_arena_with_heights_that_default_to_infinity() -> None:
     obstacles = obstacle_arrays(ARENAS)
     assert obstacles.circle_start.tolist() == [0, 1, 1, 1]
@@ -252,6 +261,15 @@ def polygon_depth(obstacle: Obstacle) -> Depth:
         return (ox * along[:, 1] - oy * along[:, 0]).max(-1)
 
     return depth
+
+
+def test_box_equals_the_polygon_of_its_corners() -> None:
+    box = Obstacle("box", 0.3, -0.2, 0.7, size_m=(1.0, 0.4))
+    polygon = Obstacle("polygon", 0.3, -0.2, 0.7, points_m=((-0.5, -0.2), (0.5, -0.2), (0.5, 0.2), (-0.5, 0.2)))
+    assert np.array_equal(box.corners_m, polygon.corners_m)
+    for first, other in zip(obstacle_arrays(((box,),)), obstacle_arrays(((polygon,),)), strict=True):
+        assert np.array_equal(first, other)
+    assert Obstacle("cylinder", 0.0, 0.0, radius_m=1.0).corners_m.shape == (0, 2)
 
 
 def obstacles(seed: int, count: int) -> tuple[Obstacle, ...]:

@@ -115,6 +115,11 @@ def test_obstacle_index_follows_only_movable_obstacles(moves: bool) -> None:
     assert is_blocked_on_floor(indices.now(), 0, *line) is moves
 
 
+def test_low_obstacles_block_a_radio_on_the_floor() -> None:
+    low = replace(Obstacle("cylinder", 0.0, 0.0, radius_m=0.5), height_m=1e-3)
+    assert is_blocked_on_floor(indexed(((low,),), SIZE_M), 0, -1.0, 0.0, 1.0, 0.0)
+
+
 def depth(obstacle: Obstacle, points: FloatArray) -> FloatArray:
     """How far each point (k, 3) is from an obstacle in m, from its rim or its top; below 0 within it."""
     apart = points[:, :2] - (obstacle.x_m, obstacle.y_m)

@@ -12,7 +12,8 @@ from scipy import stats
 from swarmwire.comms.base.arrays import FloatArray
 from swarmwire.comms.base.clock import NS_PER_S
 from swarmwire.comms.base.draws import derive_key
-from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps
+from swarmwire.comms.radio.config.impairments import Bursts, bursts_from_steps, bursts_of_mean
+from swarmwire.comms.radio.config.presets import PRESETS, with_preset
 from swarmwire.comms.radio.config.radio import Radio, Trace
 from swarmwire.comms.radio.context import ChannelContext
 from swarmwire.comms.radio.medium import RadioMedium
@@ -20,6 +21,7 @@ from swarmwire.comms.radio.stages.burst_loss import MIN_CAPACITY, bad_after
 from swarmwire.comms.radio.stages.chain import stages_after
 from swarmwire.comms.radio.stages.losses import AT_FRAME_NS, LOSS_MODELS, LossChain
 from swarmwire.comms.radio.traces import LinkTraces
+from swarmwire.comms.robot.packets import Fate
 from tests.support.comms.radio import (
     RATE_HZ,
     SIZE_M,
@@ -35,6 +37,7 @@ from tests.support.comms.radio import (
     trace_of,
     with_access,
 )
+from tests.support.comms.radio import packets as packets_at
 
 POSE = at((0, 0), (1, 0), (0, 1))
 RATIOS = LinkTraces(
@@ -59,6 +62,10 @@ STANDARD_ERRORS = 4.4
 LOSSY = (0.01, 0.1, 1.0, 0.0)  # p, r, 1-h, 1-k
 LEAKY = (0.02, 0.25, 0.7, 0.01)
 RATES = st.floats(1e-3, 1e3)
+FALSE_ALARM_RATE = 1e-4
+# Wald and Wolfowitz: given how many packets of a sequence are lost, the runs of equal fates are as many as in a random
+# order. Two-sided, at 1 in 10,000 for each sequence; keys are fixed.
+SENDERS, TICKS = 12, 1500
 RADIUS_M = 0.1
 BLOCKING = Radio(9.0, send_offset="tick", bodies_block=True)
 
@@ -185,6 +192,23 @@ def test_burst_losses_have_the_stated_rate_and_correlation(steps, lags: dict[int
     assert is_mean((lost[:, :-1] * (lost[:, 1:] - after_loss)).mean(axis=1), 0.0)
 
 
+@pytest.mark.parametrize("mean_loss", [0.0, 0.3, 0.9])
+def test_burst_loss_equals_the_configured_mean(mean_loss: float):
+    lost = losses(bursts_of_mean(mean_loss, 1.0, 0.0, 0.5), 0.1, 800).astype(float)
+    assert is_mean(lost.mean(axis=1), mean_loss) if mean_loss else not lost.any()
+
+
+@pytest.mark.parametrize("interval_s", [0.02, 0.1, 0.4])
+def test_burst_duration_is_independent_of_the_send_rate(interval_s: float):
+    """The share of bad time, and the correlation over 0.4 s, do not depend on the packets in between."""
+    bursts = Bursts(bad_s=0.5, good_s=2.0)
+    lost = losses(bursts, interval_s, round(80.0 / interval_s)).astype(float)
+    assert is_mean(lost.mean(axis=1), 0.2)
+    lag = round(0.4 / interval_s)
+    after_04_s = (lost[:, lag:] * lost[:, :-lag]).mean(axis=1)
+    assert is_mean(after_04_s, 0.2 * (0.2 + 0.8 * np.exp(-(1.0 / 0.5 + 1.0 / 2.0) * 0.4)))
+
+
 def test_burst_lengths_are_geometric():
     """Chi-square over lengths 1 to 15 and more; false alarm 1 in 1000."""
     lost = losses(bursts_from_steps(0.02, 0.2, 1.0, 0.0, 0.1), 0.1, 1000)
@@ -275,6 +299,41 @@ def test_burst_states_forgotten_change_no_fates_and_free_memory():
     assert max(sizes) > MIN_CAPACITY
 
 
+def sequences(radio: Radio) -> np.ndarray:
+    """Which packets of each sender are lost to one listener, (senders, packets), one each tick."""
+    pose = at(*((0.01 * i, 0.5) for i in range(SENDERS)), (0.0, 0.0))
+    sent = packets_at(range(SENDERS), SENDERS)
+    result = run(make_medium(radio, SENDERS + 1), pose, lambda _: sent, TICKS, 2)
+    lost = np.zeros((SENDERS, TICKS), bool)
+    lost[result.finished("sender"), result.finished("sequence")] = result.finished("fate") != Fate.RECEIVED
+    return lost
+
+
+def runs_p(lost: np.ndarray) -> float:
+    """The p-value of one sequence."""
+    n, a = len(lost), int(lost.sum())
+    b = n - a
+    runs = 1 + int(np.count_nonzero(lost[1:] != lost[:-1]))
+    mean = 1.0 + 2.0 * a * b / n
+    variance = (mean - 1.0) * (mean - 2.0) / (n - 1.0)
+    return float(2.0 * stats.norm.sf(abs(runs - mean) / np.sqrt(variance)))
+
+
+@pytest.mark.parametrize("loss", [0.1, 0.5])
+def test_fixed_loss_passes_the_runs_test(loss: float):
+    p = [runs_p(lost) for lost in sequences(Radio(9.0, send_offset="tick", loss=loss))]
+    assert min(p) > FALSE_ALARM_RATE / SENDERS
+    # And the p-values are uniform, so that the test is neither blind nor loud: Kolmogorov-Smirnov, 1 in 10,000.
+    assert stats.kstest(p, "uniform").pvalue > FALSE_ALARM_RATE
+
+
+@pytest.mark.parametrize("bursts", [Bursts(0.5, 2.0), Bursts(0.5, 2.0, 0.8, 0.05)])
+def test_burst_loss_fails_the_runs_test_on_every_link(bursts: Bursts):
+    lost = sequences(Radio(9.0, send_offset="tick", bursts=bursts))
+    assert max(runs_p(link) for link in lost) < FALSE_ALARM_RATE
+    assert lost.mean() == pytest.approx(bursts.loss, abs=0.05)
+
+
 def medium_of(radio: Radio, robots: int, arenas: int = 1) -> RadioMedium:
     """Without obstacles, every robot with the same radius."""
     keys = np.array([derive_key("bodies", arena) for arena in range(arenas)], np.uint64)
@@ -310,3 +369,9 @@ def test_body_blocking_of_an_arena_is_independent_of_others():
     alone = run(medium_of(BLOCKING, 30), pose[:30], everybody(30), 1).tally.fates
     assert together[0].tolist() == alone[0].tolist()
     assert together[0].tolist() != together[1].tolist()
+
+
+@pytest.mark.parametrize("name", ["argos-rab", "infrared-epuck"])
+def test_infrared_presets_are_blocked_by_bodies(name: str):
+    assert PRESETS[name].radio["bodies_block"]
+    assert with_preset({"preset": name, "bodies_block": False})["bodies_block"] is False

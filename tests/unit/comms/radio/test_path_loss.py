@@ -19,13 +19,14 @@ from swarmwire.comms.radio.config.path_loss_models import (
     LogDistance,
     LossCurve,
     TwoRay,
+    loss_at_1_m_db,
 )
 from swarmwire.comms.radio.config.radio import Radio
 from swarmwire.comms.radio.propagation.decibels import from_db
 from swarmwire.comms.radio.propagation.obstruction import BodyParams, bodies_between, is_on_line, wall_loss_db
 from swarmwire.comms.radio.propagation.path_loss import loss_db, reach_m, rssi_dbm
 from swarmwire.comms.radio.reception.receiver import chunk_success, ieee802154
-from tests.support.comms.lines import crossed_on_floor, indexed
+from tests.support.comms.lines import crossed_on_floor, indexed, is_blocked_on_floor
 
 getcontext().prec = 40
 PI = Decimal("3.1415926535897932384626433832795028841972")
@@ -67,6 +68,18 @@ def received_w(model, distance_m: float) -> float:
     return NS3_W / from_db(loss_db(model.curve(NS3_HZ), distance_m))
 
 
+@pytest.mark.parametrize(
+    ("frequency_hz", "stated_db"),
+    [
+        (868e6, 31.218), (915e6, 31.676), (2.400e9, 40.052), (2.412e9, 40.095), (2.437e9, 40.185),
+        (2.440e9, 40.196), (2.450e9, 40.231), (5.150e9, 46.684), (5.180e9, 46.734),
+    ],
+)  # fmt: skip
+def test_free_space_loss_at_one_metre_matches_the_table(frequency_hz: float, stated_db: float):
+    assert loss_at_1_m_db(frequency_hz) == pytest.approx(stated_db, abs=5e-4)
+    assert loss_db(Friis().curve(frequency_hz), 1.0) == loss_at_1_m_db(frequency_hz)
+
+
 @given(st.floats(1.0, 1e5), FREQUENCIES)
 def test_friis_is_exact(distance_m: float, frequency_hz: float):
     assert loss_db(Friis().curve(frequency_hz), distance_m) == pytest.approx(
@@ -89,6 +102,17 @@ def test_path_loss_of_two_ray_is_exact(distance_m: float, frequency_hz: float, s
     expected = float(friis_db(distance_m, frequency_hz) if near else ground)
     curve = TwoRay(sender_m, receiver_m).curve(frequency_hz)
     assert loss_db(curve, distance_m) == pytest.approx(expected, rel=EXACT, abs=1e-12)
+
+
+@given(FREQUENCIES, st.floats(0.05, 30.0), st.floats(0.05, 30.0))
+def test_crossover_of_two_ray_is_exact_and_continuous(frequency_hz: float, sender_m: float, receiver_m: float):
+    model = TwoRay(sender_m, receiver_m)
+    expected = 4 * PI * Decimal(sender_m) * Decimal(receiver_m) * Decimal(frequency_hz) / LIGHT
+    assert model.crossover_m(frequency_hz) == pytest.approx(float(expected), rel=EXACT)
+    curve = model.curve(frequency_hz)
+    ground_db = float(40 * expected.log10() - 20 * (Decimal(sender_m) * Decimal(receiver_m)).log10())
+    assert friis_db(float(expected), frequency_hz) == pytest.approx(Decimal(ground_db), abs=Decimal("1e-11"))
+    assert curve.break_m == model.crossover_m(frequency_hz)
 
 
 @given(st.floats(1.0, 1e5), FREQUENCIES, st.integers(0, 4))
@@ -119,6 +143,11 @@ def test_received_power_matches_ns3(model, distance_m: float, stated_w: float, t
     assert received_w(model, distance_m) == pytest.approx(stated_w, rel=tolerance)
 
 
+def test_crossover_of_two_ray_follows_from_the_heights():
+    assert TwoRay().crossover_m(NS3_HZ) == pytest.approx(226.19, abs=0.005)
+    assert TwoRay(0.2, 0.2).crossover_m(NS3_HZ) == pytest.approx(4.02, abs=0.005)
+
+
 def test_itu_indoor_matches_ns3():
     """Two floors and (0, 30, 9) m apart in a residential building."""
     curve = ItuIndoor("residential", floors=2).curve(2.114e9)
@@ -147,13 +176,6 @@ def test_path_loss_is_constant_below_one_metre(model):
     assert reach_m(curve, loss_db(curve, 1.0) - 1e-6) == 0.0
 
 
-def test_path_loss_model_has_default_parameters_and_a_unit_disk_none():
-    laws = {"log-distance": LogDistance(), "friis": Friis(), "two-ray": TwoRay(), "itu-indoor": ItuIndoor()}
-    assert {name: Radio(model=name).path_loss_model for name in laws} == laws
-    with pytest.raises(ValueError, match="model: a unit disk has no path loss"):
-        _ = Radio(2.0).path_loss_model
-
-
 @pytest.mark.parametrize("model", MODELS)
 @given(st.floats(1.0, 1e5), FREQUENCIES)
 def test_reach_is_the_inverse_of_path_loss(model, distance_m: float, frequency_hz: float):
@@ -169,6 +191,13 @@ def test_reach_stops_at_a_jump_of_path_loss():
     for spare_db in (0.0, 6.0, 12.0):
         assert reach_m(curve, at_break_db + spare_db) == pytest.approx(16.0, rel=EXACT)
     assert reach_m(curve, loss_db(curve, 30.0)) == pytest.approx(30.0, rel=EXACT)
+
+
+def test_path_loss_model_has_default_parameters_and_a_unit_disk_none():
+    laws = {"log-distance": LogDistance(), "friis": Friis(), "two-ray": TwoRay(), "itu-indoor": ItuIndoor()}
+    assert {name: Radio(model=name).path_loss_model for name in laws} == laws
+    with pytest.raises(ValueError, match="model: a unit disk has no path loss"):
+        _ = Radio(2.0).path_loss_model
 
 
 def through(obstacles: ObstacleIndex, *line: float, arena: int = 0) -> tuple[int, float]:
@@ -208,11 +237,57 @@ def test_wall_loss_counts_obstacles_and_metres_of_its_arena_and_overlaps_twice()
     assert through(walls(), -2.0, 0.0, 8.0, 0.0, arena=2) == (2, pytest.approx(4.0, rel=1e-12))
 
 
+@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES)
+def test_wall_chords_are_equal_in_both_directions(ax: float, ay: float, bx: float, by: float):
+    assert through(walls(), ax, ay, bx, by) == through(walls(), bx, by, ax, ay)
+
+
+@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES, st.floats(0.0, 1.0))
+def test_wall_chords_of_parts_add_up(ax: float, ay: float, bx: float, by: float, share: float):
+    mx, my = ax + share * (bx - ax), ay + share * (by - ay)
+    parts_m = through(walls(), ax, ay, mx, my)[1] + through(walls(), mx, my, bx, by)[1]
+    # A point in the middle is off the line by rounding; a chord that grazes a circle changes by the root of that.
+    assert parts_m == pytest.approx(through(walls(), ax, ay, bx, by)[1], abs=1e-6)
+
+
+@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES)
+def test_line_with_a_wall_chord_is_blocked(ax: float, ay: float, bx: float, by: float):
+    crossed, inside_m = through(walls(), ax, ay, bx, by)
+    assert inside_m <= math.hypot(bx - ax, by - ay) + 1e-12
+    assume(inside_m == 0.0 or inside_m > 1e-9)  # `is_blocked` has other roundings
+    assert not crossed or is_blocked_on_floor(walls(), 0, ax, ay, bx, by)
+
+
+@given(COORDINATES, COORDINATES, COORDINATES, COORDINATES, st.floats(-math.pi, math.pi), COORDINATES, COORDINATES)
+def test_wall_chords_are_invariant_under_rigid_motion(ax, ay, bx, by, turn, dx, dy):
+    c, s = math.cos(turn), math.sin(turn)
+
+    def moved(x: float, y: float) -> tuple[float, float]:
+        return c * x - s * y + dx, s * x + c * y + dy
+
+    x, y = moved(BOX.x_m, BOX.y_m)
+    box = Obstacle("box", x, y, heading_rad=turn, size_m=BOX.size_m)
+    moved_m = through(indexed(((box,),), SIZE_M), *moved(ax, ay), *moved(bx, by))[1]
+    original_m = through(indexed(((BOX,),), SIZE_M), ax, ay, bx, by)[1]
+    near_a_side = abs(abs(ax - 5.0) - 1.0) < 1e-6 and abs(ax - bx) < 1e-6
+    near_a_side |= abs(abs(ay) - 2.0) < 1e-6 and abs(ay - by) < 1e-6
+    assume(not near_a_side)  # along a side, rounding decides which side of it the line is
+    assert moved_m == pytest.approx(original_m, abs=1e-6)
+
+
 def bodies_on_floor(x: FloatArray, y: FloatArray, radius_m: FloatArray, cell_m: float, arenas: int) -> BodyParams:
     grid = grid_over((10.0, 10.0), cell_m, arenas, len(x), clamps=True)
     sort(grid, np.column_stack([x, y]).reshape(arenas, -1, 2), np.ones(arenas, np.bool_))
     height_m = np.full(len(x), 0.1)
     return BodyParams(x, y, np.zeros(len(x)), radius_m, height_m, float(radius_m.max()), grid, len(x) // arenas)
+
+
+def test_bodies_on_the_line_are_counted_but_not_its_ends():
+    x, y = np.array([0.0, 1.0, 2.0, 3.0, 1.5, 4.0]), np.array([0.0, 0.05, 0.2, 0.0, -0.09, 0.0])
+    bodies = bodies_on_floor(x, y, np.full(6, 0.1), 5.0, 1)
+    # Robot 1 and robot 4 are on it, robot 2 is beside it, robot 5 behind it.
+    a, b = np.array([0, 3, 0]), np.array([3, 0, 1])
+    assert bodies_between(bodies, a, b).tolist() == [2, 2, 0]
 
 
 @pytest.mark.parametrize("cell_m", [0.2, 1.0, 30.0])

@@ -48,6 +48,7 @@ BY_BITS = (
     gazebo(),
 )
 MEASURED = SuccessTable((-94.0, -93.0, -90.0), (0.4, 0.6, 0.86), 800)
+NS3_BOLTZMANN_DB = 10.0 * math.log10(1.3803e-23 / 1.380649e-23)
 TABLE = SuccessTable((0.0, 6.0), (0.0, 1.0), 800)
 getcontext().prec = 60
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494")
@@ -124,6 +125,18 @@ def test_success_table_that_does_not_rise_is_refused(sinr_db, success, key: str)
         refuse_unless_rising(SuccessTable(sinr_db, success, 100), "a.toml", "radio.reception")
 
 
+@pytest.mark.parametrize(("bandwidth_hz", "stated_dbm"), [(1.0, -173.975), (1e6, -113.975), (2e6, -110.965)])
+def test_thermal_noise_is_k_t_b(bandwidth_hz: float, stated_dbm: float):
+    assert noise_dbm(bandwidth_hz) == pytest.approx(stated_dbm, abs=5e-4)
+    assert noise_dbm(bandwidth_hz, 7.0) == pytest.approx(noise_dbm(bandwidth_hz) + 7.0, rel=1e-15)
+
+
+@pytest.mark.parametrize(("bandwidth_hz", "stated_dbm"), [(5e6, -106.987), (20e6, -100.966), (22e6, -100.552)])
+def test_thermal_noise_matches_ns3_but_for_boltzmann(bandwidth_hz: float, stated_dbm: float):
+    """It has 1.3803e-23 J/K, which is 0.0011 dB less."""
+    assert noise_dbm(bandwidth_hz) + NS3_BOLTZMANN_DB == pytest.approx(stated_dbm, abs=6e-4)
+
+
 @given(st.floats(1e3, 1e9), st.floats(0.0, 40.0))
 def test_thermal_noise_is_exact(bandwidth_hz: float, figure_db: float):
     milliwatts = 1000 * Decimal("1.380649e-23") * Decimal(290) * Decimal(bandwidth_hz)
@@ -135,6 +148,12 @@ def test_thermal_noise_is_exact(bandwidth_hz: float, figure_db: float):
 def test_sensitivity_of_802_15_4_matches_ns3():
     assert sinr_for_db(ieee802154(), 0.99, 20 * 8) == pytest.approx(0.4035, abs=5e-4)
     assert sensitivity_dbm(ieee802154(), -106.987, 0.99, 20 * 8) == pytest.approx(-106.583, abs=1e-3)
+
+
+def test_sensitivity_is_where_frames_begin_to_get_through():
+    receiver = ieee80211ag(24_000_000)
+    sinr_db = sinr_for_db(receiver, 0.9, 8000)
+    assert chunk_success(receiver, from_db(sinr_db), 8000) == pytest.approx(0.9, rel=1e-9)
 
 
 def test_sensitivity_of_constant_success_is_at_the_ends():
@@ -284,6 +303,16 @@ def test_soft_decisions_of_bpsk_have_the_union_bound(sinr_db: float):
     assert error_rates.ofdm_path_errors(0, from_db(sinr_db)) == pytest.approx(min(bound, 1.0), rel=1e-12)
 
 
+@pytest.mark.parametrize("rate", range(8))
+def test_soft_decisions_gain_three_to_five_decibels_over_hard_ones(rate: int):
+    """At 90 % of 1458 octets; 3 dB of those that the bits lose, and what Chernoff's bound adds."""
+    soft, hard = (
+        ieee80211ag(error_rates.OFDM_RATES_BPS[rate]),
+        ieee80211ag(error_rates.OFDM_RATES_BPS[rate], Model.NIST),
+    )
+    assert 3.0 < sinr_for_db(hard, 0.9, 8 * 1458) - sinr_for_db(soft, 0.9, 8 * 1458) < 4.6
+
+
 # By Mbit/s: SINR in dB at which ns-3 3.44 loses 10 % and 1 % of frames of so many octets. Its TableBasedErrorRateModel
 # has tables for 32 and 1458 octets, and interpolates linearly over the SINR. Below 400 octets the success is that of 32
 # octets to the power octets / 32, from 400 on that of 1458 to the power octets / 1458. It has no table for 9 Mbit/s.
@@ -369,3 +398,21 @@ def test_errors_of_802_15_4_are_exact(sinr_db: float):
 )
 def test_errors_of_802_15_4_match_ns3(sinr_db: float, stated: float, tolerance: float):
     assert error_rates.oqpsk_bit_errors(from_db(sinr_db)) == pytest.approx(stated, abs=tolerance)
+
+
+@pytest.mark.parametrize(
+    ("sinr_db", "bit_errors", "lost_20", "lost_40", "lost_127"),
+    [
+        (-5, 7.517e-2, 1, 1, 1), (-4, 3.916e-2, 0.99833, 1, 1), (-3, 1.642e-2, 0.92926, 0.99500, 1),
+        (-2, 5.197e-3, 0.56556, 0.81126, 0.99498), (-1, 1.149e-3, 0.16801, 0.30780, 0.68901),
+        (0, 1.615e-4, 0.02552, 0.05038, 0.15136), (0.407, 6.227e-5, 0.00991, 0.01973, 0.06131),
+        (1, 1.291e-5, 0.00206, 0.00412, 0.01303), (2, 5.131e-7, 0.00008, 0.00016, 0.00052),
+        (3, 8.597e-9, 0, 0, 0.00001),
+    ],
+)  # fmt: skip
+def test_frames_of_802_15_4_are_lost_by_the_table(sinr_db, bit_errors, lost_20, lost_40, lost_127):
+    sinr = from_db(sinr_db)
+    assert error_rates.oqpsk_bit_errors(sinr) == pytest.approx(bit_errors, rel=2e-4)
+    for octets, lost in ((20, lost_20), (40, lost_40), (127, lost_127)):
+        # The table has five digits, and no row for frames that are lost surely but for 1e-5.
+        assert 1.0 - error_rates.oqpsk_success(sinr, octets * 8) == pytest.approx(lost, abs=1.2e-5)

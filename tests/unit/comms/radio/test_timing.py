@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
+from scipy import integrate, stats
 
 from swarmwire.comms.base.clock import NS_PER_S
+from swarmwire.comms.base.draws import derive_key, uniform
 from swarmwire.comms.base.ethernet import exchanged, station
 from swarmwire.comms.radio.config.impairments import DISTRIBUTIONS, Delays, refuse_negative
 from swarmwire.comms.radio.config.phy import Access
@@ -40,6 +41,7 @@ from tests.support.refusals import refused_input
 PAIR = at((0, 0), (1, 0))
 AIRTIME_NS = 320_000  # 10 bytes at 250 kbit/s
 OCTETS = st.integers(0, 2304)
+DRAWS = uniform(derive_key("delays"), np.arange(20_000), 0, 0, 0)
 LAST_DRAW = 1.0 - 2.0**-53
 UNITS = st.floats(0.0, LAST_DRAW)
 
@@ -94,6 +96,17 @@ def test_radio_without_a_send_offset_or_range_is_refused(radio: Radio, key: str)
         make_medium(radio, 2)
 
 
+def test_geometry_is_that_of_the_tick_on_air():
+    """Sent in tick 0, on air in tick 1 (its very start included), near in only one of them."""
+    near, far = at((0, 0), (1, 0)), at((0, 0), (3, 0))
+    for before, after, send_offset, received in ((near, far, 0.15, 0), (far, near, 0.15, 1), (far, near, 0.1, 1)):
+        medium = make_medium(Radio(2.0, send_offset=send_offset), 2)
+        medium.step(0, before)
+        medium.send(0, 0, packets([0]))
+        assert len(medium.step(TICK_NS, after).finished.fate) == 0
+        assert len(medium.step(2 * TICK_NS, after).received) == received
+
+
 def test_time_does_not_run_backwards():
     medium = make_medium(Radio(2.0), 2)
     medium.step(TICK_NS, at((0, 0), (1, 0)))
@@ -113,22 +126,38 @@ def test_empty_send_takes_no_sequence_number():
 
 
 @pytest.mark.parametrize(
-    ("airtime_ns", "rate_bps", "octets", "stated_us"),
+    ("psdu_octets", "stated_us"), [(5, 352), (11, 544), (20, 832), (31, 1184), (60, 2112), (100, 3392), (127, 4256)]
+)
+def test_airtime_of_802_15_4_matches_the_standard(psdu_octets: int, stated_us: int):
+    assert at_bit_rate_ns(6 + psdu_octets, 250_000) == stated_us * US
+
+
+@pytest.mark.parametrize(
+    ("octets", "rate_bps", "stated_us"),
     [
-        *((ieee80211b_ns, 11_000_000, 1023 + i, 936 + i) for i in range(4)),
-        *((ieee80211b_ns, 2_000_000, 1023 + i, 4284 + 4 * i) for i in range(4)),
-        *((ieee80211b_ns, 1_000_000, 1023 + i, 8376 + 8 * i) for i in range(4)),
-        *((ieee80211b_ns, 11_000_000, octets, us) for octets, us in ((1536, 1310), (76, 248), (14, 203))),
-        (ieee80211b_ns, 1_000_000, 14, 304),
-        *((ieee80211a_ns, 54_000_000, octets, us) for octets, us in ((1536, 248), (76, 32), (14, 24))),
-        *((ieee80211g_ns, 54_000_000, octets, us) for octets, us in ((1536, 254), (76, 38), (14, 30))),
-        # MCS 7 in 20 MHz: ns-3's test of durations, and A-MPDU of 6 and 29 packets of 1472 octets.
-        *((ieee80211n_ns, 65_000_000, octets, us) for octets, us in ((1536, 228), (76, 48), (14, 40))),
-        *((ieee80211n_ns, 65_000_000, octets, us) for octets, us in ((9094, 1156), (43962, 5448))),
+        *((1023 + i, 11_000_000, 936 + i) for i in range(4)),
+        *((1023 + i, 2_000_000, us) for i, us in enumerate((4284, 4288, 4292, 4296))),
+        *((1023 + i, 1_000_000, us) for i, us in enumerate((8376, 8384, 8392, 8400))),
+        (14, 1_000_000, 304),
+        (1536, 11_000_000, 1310),
+        (76, 11_000_000, 248),
+        (14, 11_000_000, 203),
     ],
 )
-def test_airtime_of_802_11_matches_ns3(airtime_ns, rate_bps: int, octets: int, stated_us: int):
-    assert airtime_ns(octets, rate_bps) == stated_us * US
+def test_airtime_of_802_11b_matches_ns3(octets: int, rate_bps: int, stated_us: int):
+    assert ieee80211b_ns(octets, rate_bps) == stated_us * US
+
+
+@pytest.mark.parametrize(("octets", "a_us", "g_us"), [(1536, 248, 254), (76, 32, 38), (14, 24, 30)])
+def test_airtime_of_802_11a_and_g_matches_ns3(octets: int, a_us: int, g_us: int):
+    assert ieee80211a_ns(octets, 54_000_000) == a_us * US
+    assert ieee80211g_ns(octets, 54_000_000) == g_us * US
+
+
+@pytest.mark.parametrize(("octets", "stated_us"), [(1536, 228), (76, 48), (14, 40), (9094, 1156), (43962, 5448)])
+def test_airtime_of_802_11n_matches_ns3(octets: int, stated_us: int):
+    """MCS 7 in 20 MHz: ns-3's test of durations, and A-MPDU of 6 and 29 packets of 1472 octets."""
+    assert ieee80211n_ns(octets, 65_000_000) == stated_us * US
 
 
 def test_bits_per_symbol_of_802_11n_are_those_of_52_subcarriers():
@@ -137,6 +166,15 @@ def test_bits_per_symbol_of_802_11n_are_those_of_52_subcarriers():
     modes = zip((1, 2, 2, 4, 4, 6, 6, 6), codes, strict=True)
     by_rate = {int(52 * bits * code * 250_000): int(52 * bits * code) for bits, code in modes}
     assert by_rate == HT_BITS_PER_SYMBOL
+
+
+def test_airtime_of_a_hundred_octets_over_udp_matches_the_source():
+    """Headers: MAC 24, FCS 4, LLC 8, IP and UDP 28; then DIFS and the mean backoff of a broadcast."""
+    octets = 100 + 24 + 4 + 8 + 28
+    b_ns, a_ns = ieee80211b_ns(octets, 1_000_000), ieee80211a_ns(octets, 6_000_000)
+    assert (b_ns, a_ns, ieee80211g_ns(octets, 6_000_000)) == (1504 * US, 244 * US, 250 * US)
+    for airtime_ns, dcf, stated_us in ((b_ns, IEEE_802_11B, 1864), (a_ns, IEEE_802_11A, 345.5)):
+        assert airtime_ns + dcf.difs_ns + dcf.cw_min * dcf.slot_ns / 2 == stated_us * US
 
 
 @given(OCTETS, st.integers(1, 10**10))
@@ -213,6 +251,27 @@ def test_delays_are_quantiles_of_their_distribution(distribution: str, mean_s: f
     for u in (1e-9, 0.001, 0.1, 0.5, 0.9, 0.999, 1.0 - 1e-9):
         # Rounded down to whole ns; scipy's truncated normal has ten digits or so.
         assert varying_delay_ns(law, u) == pytest.approx(expected.ppf(u) * NS_PER_S, rel=1e-9, abs=1.01)
+
+
+@pytest.mark.parametrize(("distribution", "tolerance"), [("uniform", 1e-6), ("lognormal", 1e-5), ("pareto", 1e-3)])
+def test_delays_have_the_configured_mean_and_deviation(distribution: str, tolerance: float):
+    """Integrated over the draw; a Pareto's second moment converges slowly."""
+    law = law_of(distribution)
+    moments = [
+        integrate.quad(lambda t, n=n: (varying_delay_ns(law, 1.0 - np.exp(-t)) * 1e-9) ** n * np.exp(-t), 0.0, 36.0)[0]
+        for n in (1, 2)
+    ]
+    assert moments[0] == pytest.approx(0.02, rel=tolerance)
+    assert np.sqrt(moments[1] - moments[0] ** 2) == pytest.approx(0.008, rel=10 * tolerance)
+
+
+def test_delays_of_a_normal_law_are_never_negative():
+    near, far = law_of("normal", 0.01, 0.02), law_of("normal", 0.02, 0.002)
+    delays_ns = np.array([varying_delay_ns(near, u) for u in DRAWS])
+    assert delays_ns.min() >= 0
+    assert delays_ns.mean() > 0.015 * NS_PER_S
+    far_ns = np.array([varying_delay_ns(far, u) for u in DRAWS])
+    assert abs(far_ns.mean() / NS_PER_S - 0.02) < 4.4 * 0.002 / np.sqrt(len(DRAWS))
 
 
 @pytest.mark.parametrize("distribution", DISTRIBUTIONS)

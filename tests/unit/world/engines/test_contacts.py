@@ -52,6 +52,19 @@ def test_robots_that_meet_head_on_stop_each_other(make: Make, steps: int, gap_m:
         assert max(deepest[-15:]) <= RESTING
 
 
+@pytest.mark.parametrize("radii_m", [(0.03, 0.15), (0.15, 0.03)])
+def test_robots_of_unequal_mass_do_not_press_into_each_other(make: Make, radii_m: tuple[float, float]) -> None:
+    radius, mass = np.array(radii_m), 1e3 * np.array(radii_m) ** 2
+    pose = [[-radius[0] - 0.05, 0.001, 0.0], [radius[1] + 0.05, 0.0, np.pi]]
+    engine = build_engine(make, pose, radius_m=radius, mass_kg=mass, max_force_n=4.0 * mass)
+    for _ in range(15):
+        engine.tick(targets(engine, 0.1))
+        assert overlap_m(engine, radius) <= transient_m(0.2, 5)
+    for _ in range(30):
+        engine.tick(targets(engine, [0.1, 0.0]))
+    assert overlap_m(engine, radius) <= 0.02 * min(radii_m)
+
+
 @pytest.mark.parametrize("heading", [0.0, 0.3, np.pi / 4, 1.0, np.pi / 2])
 def test_robot_that_drives_into_a_corner_stays_there(make: Make, heading: float) -> None:
     size_m = (2.0, 3.0)

@@ -13,10 +13,10 @@ from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.world.engines.discs.engine import DiscsEngine
 from swarmwire.world.engines.engine import Engine, EngineConfig, EngineMotors
 from swarmwire.world.engines.kinematic import KinematicEngine
-from tests.support.world.engines.conformance import EVERY, FLOOR, TICK_S, Make, R, build_engine, packed, targets
+from tests.support.world.engines.conformance import EVERY, FLOOR, Make, R, build_engine, packed, targets
 from tests.support.world.scenes import rim
 
-RADIUS_M = 0.05
+RADIUS_M, TICK_S = 0.05, 0.1
 BOX = Obstacle("box", 1.0, 0.0, 0.3, size_m=(0.02, 1.0), height_m=0.5)
 DISC = Obstacle("cylinder", 1.0, 0.0, radius_m=0.2, height_m=0.5)
 TRIANGLE = Obstacle("polygon", 1.0, 0.0, 0.4, points_m=((-0.3, -0.2), (0.3, -0.2), (0.0, 0.4)), height_m=0.5)
@@ -34,10 +34,16 @@ def engine(
     pose: Any, obstacles: tuple[Obstacle, ...] = (), boundary: Any = "walls", bottom_m: Any = 0.0
 ) -> KinematicEngine:
     """Discs of RADIUS_M, 0.1 m high, at pose (n, 3) or (arenas, n, 3) in a square of 4 m."""
-    shapes = {"radius_m": RADIUS_M, "wheel_base_m": 0.06, "bottom_m": bottom_m}
-    made = build_engine(KinematicEngine, pose, boundary=boundary, obstacles=obstacles, **shapes)
-    assert isinstance(made, KinematicEngine)
-    return made
+    at = np.array(pose, np.float64)
+    at = at if at.ndim == 3 else at[None]
+    n, standing = at.shape[1], (obstacles,) * len(at)
+    bottom = np.broadcast_to(np.asarray(bottom_m, np.float64), n).copy()
+    motors = EngineMotors(*(np.full(n, value) for value in (0.06, 1.0, 1.0, 1.0, 1.0)))
+    shapes = np.full(n, RADIUS_M), bottom, bottom + 0.1, motors
+    config = EngineConfig(
+        (4.0, 4.0), boundary, standing, obstacle_arrays(standing), *shapes, TICK_S, 5, np.zeros(len(at[0]), np.bool_)
+    )
+    return KinematicEngine(config, at)
 
 
 def target(*rows: tuple[float, float, float]) -> FloatArray:

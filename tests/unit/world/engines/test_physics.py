@@ -78,7 +78,9 @@ def test_engine_of_the_scenario_is_used(engine: str) -> None:
         ({}, {"obstacles": [{**MOVABLE, "movable": False}]}, "arena.obstacles.0.mass_kg"),
     ],
 )
-def test_physics_contradictions_are_refused_with_their_key(physics: dict[str, Any], arena: dict[str, Any], key: str):
+def test_physics_contradictions_are_refused_with_their_key(
+    physics: dict[str, Any], arena: dict[str, Any], key: str
+) -> None:
     with refused_input("posed", key):
         posed([[-1.0, 0.0, 0.0]], physics=physics, arena={**ARENA, **arena})
 
@@ -193,7 +195,8 @@ def test_released_obstacle_slides_no_farther_than_friction_allows() -> None:
     assert pose_of(world)[0] - start <= 0.12**2 / (2.0 * FLOOR_FRICTION * GRAVITY_MPS2) + 0.12 * 0.1
 
 
-def test_obstacle_arrays_follow_movable_obstacles() -> None:
+@pytest.mark.parametrize("seeds", [[5], [4, 5, 6]])
+def test_obstacle_arrays_follow_movable_obstacles(seeds: list[int]) -> None:
     tables = [
         {"shape": "box", "size_m": [0.2, 0.2], "at": [1.5, 1.5]},
         *({**shape, "place": "random", "count": 3, "movable": True, "mass_kg": 0.05} for shape in SHAPES),
@@ -201,12 +204,12 @@ def test_obstacle_arrays_follow_movable_obstacles() -> None:
     ]
     group = {"body": "epuck", "count": 40, "agent": "x"}
     arena = {"size_m": [4.0, 4.0], "obstacles": tables}
-    world = World(posed([], arena=arena, robots={"a": group}), [4, 5, 6], {})
+    world = World(posed([], arena=arena, robots={"a": group}), seeds, {})
     assert world.movable is not None
     start = world.movable
     for tick in range(150):
         world.move(wandering(world, tick))
-    assert (np.hypot(*(world.movable - start)[..., :2].reshape(-1, 2).T) > 0.01).sum() >= 3
+    assert (np.hypot(*(world.movable - start)[..., :2].reshape(-1, 2).T) > 0.01).sum() >= len(seeds)
     static = world.static
     now = tuple(
         (fixed[0], *static.movable_at(arena, world.movable[arena]), fixed[-1])
@@ -215,11 +218,23 @@ def test_obstacle_arrays_follow_movable_obstacles() -> None:
     expected = obstacle_arrays(now)
     for have, want in zip(world.obstacles, expected, strict=True):
         assert np.allclose(have, want, atol=1e-12)
-    alone = World(posed([], arena=arena, robots={"a": group}), [5], {})
-    for tick in range(150):
-        alone.move(wandering(alone, tick))
-    assert alone.movable is not None
-    assert np.array_equal(alone.movable[0], world.movable[1])
+    if len(seeds) > 1:
+        alone = World(posed([], arena=arena, robots={"a": group}), [5], {})
+        for tick in range(150):
+            alone.move(wandering(alone, tick))
+        assert alone.movable is not None
+        assert np.array_equal(alone.movable[0], world.movable[1])
+
+
+def test_proximity_senses_an_obstacle_that_another_robot_pushes() -> None:
+    poses = [[-0.3, 0.0, 0.0], [0.5, 0.0, np.pi]]
+    world = world_with({**CYLINDER, "at": [0.0, 0.0]}, poses=poses, needs={"a": ["proximity"]})
+    before = world.sense(0)["a"].fields["proximity.value"][1].max()
+    for _ in range(120):
+        world.move(commanded(world, [0.1, 0.0], 0.0))
+    after = world.sense(1)["a"].fields["proximity.value"][1].max()
+    assert before < 0.2
+    assert after > 0.5
 
 
 def test_friction_torque_uses_the_mean_distance_of_the_area() -> None:

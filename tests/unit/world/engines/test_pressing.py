@@ -56,26 +56,34 @@ def line_poses(names: Sequence[str], face_m: float, run_up_m: float = 0.1) -> Fl
     return np.column_stack([x_m, np.zeros((len(names), 2))])
 
 
+def press(engine: Engine, radius_m: FloatArray, face_m: float) -> FloatArray:
+    """Let the last robot drive into the others for 10 s; the deepest overlap after each tick."""
+    speed_mps = np.zeros(len(radius_m))
+    speed_mps[-1] = 0.3
+    overlaps: list[float] = []
+    for _ in range(100):
+        engine.tick(targets(engine, speed_mps))
+        in_face_m = float((engine.state[0, :, 0] + radius_m).max()) - face_m
+        overlaps.append(max(overlap_m(engine, radius_m), in_face_m))
+    return np.array(overlaps)
+
+
 @pytest.mark.parametrize("rows", [1, -1], ids=["light-first", "heavy-first"])
 @pytest.mark.parametrize("standing", STANDING)
 @pytest.mark.parametrize("names", LINES, ids="-".join)
 @pytest.mark.parametrize("make", FLOOR)
 def test_robots_pressed_against_an_obstacle_rest_without_overlap(
     make: Make, names: list[str], standing: str, rows: int
-):
-    """On the way, discs never overlap; bodies of pymunk do for a while, but none changes sides."""
+) -> None:
     obstacles, face_m = STANDING[standing]
     order = np.arange(len(names))[::rows]
     radius_m = np.array([load_body(name).radius_m for name in names])
     engine, row_radius_m = engine_of(
         make, [names[k] for k in order], line_poses(names, face_m)[order], size_m=SIZE_M, obstacles=obstacles
     )
-    speed_mps, deepest_m = np.where(order == len(names) - 1, 0.3, 0.0), -np.inf
+    speed_mps = np.where(order == len(names) - 1, 0.3, 0.0)
     for _ in range(100):
         engine.tick(targets(engine, speed_mps))
-        in_face_m = float((engine.state[0, :, 0] + row_radius_m).max()) - face_m
-        deepest_m = max(deepest_m, overlap_m(engine, row_radius_m), in_face_m)
-    assert deepest_m <= (MAX_OVERLAP_M if make is DiscsEngine else radius_m.min())
     # Rigid discs: each stands where those before it end.
     x_m = face_m - 2.0 * np.cumsum(radius_m) + radius_m
     assert engine.state[0, :, 0] == pytest.approx(x_m[order], abs=MAX_OVERLAP_M)
@@ -83,6 +91,21 @@ def test_robots_pressed_against_an_obstacle_rest_without_overlap(
     assert np.abs(engine.state[0, :, 3:5]).max() < 0.02
     # The wheels stood soon after the run-up: 0.1 m, and 0.1 m more at most.
     assert engine.travel_m[0, order.argmax()].max() < 0.2
+
+
+@pytest.mark.parametrize("standing", STANDING)
+@pytest.mark.parametrize("names", LINES, ids="-".join)
+def test_discs_never_pass_through_what_they_press(names: list[str], standing: str) -> None:
+    obstacles, face_m = STANDING[standing]
+    engine, radius_m = engine_of(DiscsEngine, names, line_poses(names, face_m), size_m=SIZE_M, obstacles=obstacles)
+    assert press(engine, radius_m, face_m).max() <= MAX_OVERLAP_M
+
+
+@pytest.mark.parametrize("names", LINES, ids="-".join)
+def test_pymunk_overlaps_on_the_way_by_less_than_the_smallest_radius(names: list[str]) -> None:
+    """The stated limit: bodies overlap for a while before they rest, but none changes sides."""
+    engine, radius_m = engine_of(PymunkEngine, names, line_poses(names, 1.5), size_m=SIZE_M)
+    assert press(engine, radius_m, 1.5).max() < radius_m.min()
 
 
 @pytest.mark.parametrize("mass_kg", [0.01, 0.1, 0.5])
@@ -127,3 +150,17 @@ def test_mixed_crowd_of_discs_in_a_shrinking_gap_never_overlaps(seed: int, still
         engine.tick(targets(engine, speed_mps, towards(engine, 2.9, 0.0)))
         assert overlap_m(engine, radius_m, (6.0, 4.0)) <= MAX_OVERLAP_M
         assert in_boxes_m(engine.state[0, :, :2], radius_m, funnel) <= MAX_OVERLAP_M
+
+
+@pytest.mark.parametrize("make", FLOOR)
+def test_pressing_is_bit_for_bit_equal_alone_and_among_arenas(make: Make) -> None:
+    names = ["kilobot", "kilobot", "footbot"]
+    pressed = line_poses(names, 1.5)
+    free, aside = pressed - np.array([1.0, 0.0, 0.0]), pressed + np.array([0.0, 0.9, 0.0])
+    ends: list[FloatArray] = []
+    for pose in ([free, pressed, aside], [pressed]):
+        engine, _ = engine_of(make, names, np.array(pose), size_m=SIZE_M)
+        for _ in range(40):
+            engine.tick(targets(engine, [0.0, 0.0, 0.3]))
+        ends.append(engine.state[1 if len(pose) == 3 else 0])
+    assert np.array_equal(*ends)

@@ -69,6 +69,15 @@ def test_camera_reach_equals_the_cameras_of_argos(height_m: float, aperture_deg:
         assert len(distances([spec.reach_m(0.0) * share, 0.0, 0.0], spec=spec, body=low)) == count
 
 
+def test_robot_hides_its_far_side_and_low_leds_behind_it() -> None:
+    facing = [0.4, 0.0, np.pi]
+    assert distances(facing) == pytest.approx([0.31, 0.4])
+    assert distances([0.4, 0.0, 0.0]) == pytest.approx([0.4])
+    between = [0.2, 0.0, np.pi]
+    assert distances(between, facing, dark=1) == pytest.approx([0.11])
+    assert distances(between, facing, dark=0) == pytest.approx([0.2, 0.4])
+
+
 def test_camera_lists_the_nearest_blobs_in_order() -> None:
     apart_m = 0.75, 0.25, 0.5, 0.625, 0.375, 0.725
     others = [[d * np.cos(a), d * np.sin(a), 0.0] for a, d in enumerate(apart_m)]

@@ -5,10 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from swarmwire.comms.base.arrays import FloatArray
+from swarmwire.comms.base.geometry.shapes import Obstacle
 from swarmwire.comms.observe.truth import Light
 from swarmwire.comms.robot.bodies.body import Body, load_body
+from swarmwire.comms.robot.sensors.rays import InfraredSpec, ProximitySpec, ResponseCurve
 from swarmwire.comms.robot.sensors.scan import ScanSpec
 from swarmwire.world.sensors.pipeline import SensorPipeline
 from swarmwire.world.sensors.sensor import Scene
@@ -16,7 +20,27 @@ from swarmwire.world.world import World
 from tests.support.world.scenes import posed, read, scene, staged
 
 EPUCK = load_body("epuck")
+REACH_M = 10 * EPUCK.radius_m  # five diameters
+RING: dict[str, Any] = {
+    "angles_deg": tuple(range(-30, 330, 30)),  # four sectors of three: ahead, left, behind, right
+    "range_m": REACH_M,
+    "response": ResponseCurve(kind="quadratic", a=0.0, b=-1.0 / REACH_M, c=1.0, reach_m=REACH_M),
+}
 FOOTBOT = load_body("footbot")
+
+
+def answers(poses: Any, obstacles: tuple[Obstacle, ...] = (), **more: Any) -> tuple[FloatArray, FloatArray]:
+    """Readings of proximity and of passive infrared of the first robot."""
+    looked_at = scene(poses, EPUCK, obstacles, **more)
+    active = read(looked_at, EPUCK, "proximity", ProximitySpec(**RING))["proximity.value"]
+    passive = read(looked_at, EPUCK, "infrared", InfraredSpec(**RING))["infrared.value"]
+    return active[0], passive[0]
+
+
+@pytest.mark.parametrize(("gap_m", "in_reach"), [(REACH_M - 1e-6, True), (REACH_M + 1e-6, False)])
+def test_infrared_range_is_measured_from_rim_to_rim(gap_m: float, in_reach: bool) -> None:
+    passive = answers([[0.0, 0.0, 0.0], [2 * EPUCK.radius_m + gap_m, 0.0, 0.0]], boundary="open")[1]
+    assert bool(passive.any()) is in_reach
 
 
 def test_scene_follows_which_robots_are_alive() -> None:
@@ -36,6 +60,13 @@ def sensor(looked_at: Scene, body: Body, **spec: Any) -> SensorPipeline:
 
 def values(looked_at: Scene, body: Body = EPUCK) -> FloatArray:
     return sensor(looked_at, body, noise=0.0).read(0)["light.value"]
+
+
+def law(distance_m: float, intensity_m: float, off_rad: FloatArray) -> FloatArray:
+    """The law of light in numpy; `off_rad` is the angle between sensors and light, any number of turns."""
+    off = np.abs(np.angle(np.exp(1j * off_rad)))
+    glow = np.exp(-2.0 * distance_m / intensity_m) if distance_m <= 2.5 * intensity_m else 0.0
+    return glow * np.where(off < np.pi / 2, 1.0 - 2.0 * off / np.pi, 0.0)
 
 
 def test_light_ahead_of_an_epuck_reads_as_the_law() -> None:
@@ -58,6 +89,22 @@ def test_lights_add_up_to_one_at_most() -> None:
     assert both == pytest.approx(first + second)
     bright = values(scene([[0, 0, 0]], EPUCK, lights=(Light(0.01, 0.0, 5.0),) * 3))
     assert bright.max() == 1.0
+
+
+@given(turn=st.floats(-20, 20), heading=st.floats(-20, 20))
+def test_light_depends_only_on_the_angle_to_the_heading(turn: float, heading: float) -> None:
+    lit = (Light(float(np.cos(turn)), float(np.sin(turn)), 2.0),)
+    assert EPUCK.light is not None
+    expected = law(1.0, 2.0, turn - heading - EPUCK.light.angle_rad)
+    assert values(scene([[0, 0, heading]], EPUCK, lights=lit))[0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_robot_casts_a_shadow_but_not_on_itself() -> None:
+    lit, radius = (Light(1.0, 0.0, 2.0),), EPUCK.radius_m
+    assert not values(scene([[0, 0, 0], [0.5, 0.99 * radius, 0]], EPUCK, lights=lit))[0].any()
+    assert values(scene([[0, 0, 0], [0.5, 1.01 * radius, 0]], EPUCK, lights=lit)).any(axis=1).all()
+    assert values(scene([[0, 0, 0], [-0.5, 0, 0]], EPUCK, lights=lit)).any(axis=1).tolist() == [True, False]
+    assert values(scene([[1.0, 0, 0]], EPUCK, lights=lit))[0].any()
 
 
 @pytest.mark.parametrize("spread_m", [2.4, 5.0])

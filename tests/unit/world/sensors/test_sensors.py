@@ -37,7 +37,7 @@ from swarmwire.world.sensors.rays import ProximitySensor
 from swarmwire.world.sensors.sensor import BuiltInSensor, Scene
 from swarmwire.world.world import World
 from tests.support.refusals import refused_input
-from tests.support.world.scenes import commanded, read, scene, staged
+from tests.support.world.scenes import SENSORS, commanded, posed, read, scene, staged
 
 EPUCK, FOOTBOT = load_body("epuck"), load_body("footbot")
 # ARGoS's foot-bot, ideal rays, an infinite wall dead ahead: gap from wall to body in m, length of the mean vector.
@@ -178,6 +178,29 @@ def test_compass_ignores_full_turns(turns: int, heading: float) -> None:
     assert heading_read[0] == pytest.approx(heading, abs=1e-12)
 
 
+@pytest.mark.parametrize("steps", [2, 5, 20])
+def test_wheels_roll_the_distance_that_the_robot_drives(steps: int) -> None:
+    world = World(posed([[0.0, 0.0, 0.3], [0.5, 0.5, 1.0], [-1.0, 0.0, 0.0]], physics={"steps": steps}), [1], {})
+    for _ in range(20):
+        world.move(commanded(world, [0.05, 0.0, 0.06], [0.0, 1.5, -0.5]))
+    rolled = world._physics.travel_m[0]
+    left, right = rolled[:, 0], rolled[:, 1]
+    assert left[0] == pytest.approx(right[0])
+    assert left[0] == pytest.approx(np.hypot(*world.pose[0, :2]))
+    turned = (right - left) / EPUCK.wheels.wheel_base_m
+    assert np.angle(np.exp(1j * (world.pose[:, 2] - [0.3, 1.0, 0.0] - turned))) == pytest.approx(np.zeros(3), abs=1e-9)
+    # The last arc: chord = 2 (v/w) sin(turn / 2), where only the path while speeding up is not on it.
+    arc_m, turn = 0.5 * (left + right)[2], turned[2]
+    assert np.hypot(*(world.pose[2, :2] - [-1.0, 0.0])) == pytest.approx(arc_m * np.sinc(turn / (2 * np.pi)), rel=1e-3)
+
+
+def test_wheels_do_not_roll_against_a_wall() -> None:
+    world = World(posed([[1.9, 0.0, 0.0]]), [1], {})
+    for _ in range(30):
+        world.move(commanded(world, 0.1, 0.0))
+    assert world._physics.travel_m[0, 0] == pytest.approx([0.1 - EPUCK.radius_m] * 2, abs=2e-3)
+
+
 def test_encoders_slip_in_each_tick_and_read_whole_steps() -> None:
     looked_at = scene(np.zeros((2, 3)), EPUCK)
     slipping = staged(looked_at, EPUCK, "odometry", OdometrySpec(slip=0.05, step_m=0.0))
@@ -192,6 +215,11 @@ def test_encoders_slip_in_each_tick_and_read_whole_steps() -> None:
             assert np.allclose(exact[field], expected[:, wheel], atol=1e-12)
             assert np.array_equal(shown[field], np.floor(exact[field] / 0.001) * 0.001)
     assert np.array_equal(slipping.read(20)["odometry.left_m"], slipping.read(20)["odometry.left_m"])
+
+
+def test_bodies_have_the_sensors_of_their_sheets() -> None:
+    assert EPUCK.sensors.keys() == FOOTBOT.sensors.keys() == {*SENSORS, "ground", "camera"}
+    assert isinstance(EPUCK.proximity, ProximitySpec)
 
 
 def test_odometry_wheel_error_is_drawn_once_per_wheel() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from swarmwire.comms.base.draws import derive_key, purpose, uniform
+from swarmwire.comms.radio.config.impairments import Bursts
 from swarmwire.comms.radio.phy.params import phy_params_of
 from swarmwire.comms.radio.phy.success import lone_deliveries
 from swarmwire.comms.robot.packets import Fate, SentPackets, TxResult
@@ -15,6 +16,7 @@ from tests.support.comms.radio import (
     Run,
     at,
     drawing,
+    everybody,
     make_medium,
     numbers_received,
     packets,
@@ -64,7 +66,31 @@ def test_cut_off_decides_which_robots_interfere():
 
 
 SEEDS = (3, 8)
+THREE = 3
 KEYS = np.array([derive_key(seed, "air") for seed in SEEDS], np.uint64)
+
+
+def draws_of(result: Run, name: str) -> np.ndarray:
+    arena = result.on_air("arena")
+    columns = (result.on_air(name) for name in ("sender", "receiver", "sequence"))
+    return uniform(KEYS[arena], *columns, purpose(name))
+
+
+def test_weak_frame_is_decoded_if_its_draw_is_below_the_probability():
+    """Two robots in each arena, too far apart for every frame to be right; what is not counts as out of range."""
+    radio = replace(with_access("none"), send_offset="tick")
+    pose, ticks = np.concatenate([at((0, 0), (112, 0)), at((0, 0), (116, 0))]), 40
+    result = run(make_medium(radio, 2, SEEDS), pose, everybody(4), ticks, 1)
+    arena, sender, sequence = (
+        column.ravel() for column in np.meshgrid(range(2), range(2), range(ticks), indexing="ij")
+    )
+    rssi_dbm = [result.on_air("rssi_dbm")[result.on_air("arena") == column][0] for column in range(2)]
+    likely = lone_deliveries(phy_params_of(radio, 2), np.array(rssi_dbm), 8.0 * (10 + radio.overhead_bytes))
+    is_right = uniform(KEYS[arena], sender, 1 - sender, sequence, purpose("reception")) < likely[arena]
+    assert 0 < np.count_nonzero(is_right) < len(is_right)
+    received = zip(*(result.on_air(name).tolist() for name in ("arena", "sender", "sequence")), strict=True)
+    expected = zip(arena[is_right].tolist(), sender[is_right].tolist(), sequence[is_right].tolist(), strict=True)
+    assert sorted(received) == sorted(expected)
 
 
 def test_retries_and_answers_over_a_weak_link_have_separate_draws():
@@ -83,6 +109,15 @@ def test_retries_and_answers_over_a_weak_link_have_separate_draws():
     acknowledged = sorted((row // 2, i) for i, row, status in learned(result) if status == int(TxResult.ACKNOWLEDGED))
     assert acknowledged == [tuple(row) for row in np.argwhere(is_answered.any(axis=2)).tolist()]
     assert 20 < len(acknowledged) < len(received) < 2 * ticks - 20
+
+
+@pytest.mark.parametrize("loss", [0.3, 1.0])
+def test_frame_is_lost_if_its_draw_is_below_the_loss(loss: float):
+    radio = replace(with_access("none"), send_offset="tick", loss=loss)
+    pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
+    result = run(make_medium(radio, THREE, SEEDS), pose, everybody(2 * THREE), 10, 1)
+    fate = np.where(draws_of(result, "fixed loss") < loss, Fate.LOST, Fate.RECEIVED)
+    assert result.on_air("fate").tolist() == fate.tolist()
 
 
 def asking(senders: list[int]) -> Callable[[int], SentPackets]:
@@ -123,6 +158,15 @@ def test_unicast_attempts_and_answers_have_separate_draws(method: str, loss: flo
     order = np.lexsort((result.on_air("arena"), result.on_air("sequence")))
     assert result.on_air("fate")[order].tolist() == [fate for fate, _ in expected]
     assert len(set(expected)) == 3
+
+
+@pytest.mark.parametrize("method", ["none", "aloha"])
+def test_bursts_alone_lose_frames_of_a_perfect_channel(method: str):
+    radio = replace(with_access(method), send_offset="tick", bursts=Bursts(0.3, 0.3))
+    pose = np.tile(at((0, 0), (1, 0), (0, 1)), (2, 1))
+    fates = run(make_medium(radio, THREE, SEEDS), pose, lambda _: packets([0, THREE]), 60, 1).fates()
+    assert set(fates) == {"RECEIVED", "BURST"}
+    assert min(fates.values()) > 50
 
 
 def test_csma_retry_waits_by_a_separate_backoff_draw():

@@ -5,10 +5,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from swarmwire.comms.base.sentinels import BROADCAST
+from swarmwire.comms.base.sentinels import BROADCAST, NO_ROBOT
+from swarmwire.comms.radio.config.antennas import Antenna
 from swarmwire.comms.radio.config.impairments import Measures, RangeMeasure
-from swarmwire.comms.radio.config.phy import Access, Reception
+from swarmwire.comms.radio.config.phy import Access, Fading, Reception, Shadowing
+from swarmwire.comms.radio.config.radio import Radio
+from swarmwire.comms.radio.disruption import Disruption, Jammers
 from swarmwire.comms.radio.phy import model
 from swarmwire.comms.radio.phy.model import Reporter
 from swarmwire.comms.radio.phy.results import ResultBuffer
@@ -17,15 +22,18 @@ from swarmwire.comms.robot.packets import Fate
 from tests.support.comms.radio import (
     ALL_MEASURES,
     METHODS,
+    OBSTACLES,
     TICK_NS,
     WIFI_B,
     Run,
     at,
+    everybody,
     living,
     make_medium,
     packets,
     run,
     scattered,
+    signal_radios,
     with_access,
 )
 
@@ -45,6 +53,15 @@ def test_delivery_of_802_15_4_over_distance_matches_its_formula(distance_m: floa
     assert result.fates().get("RECEIVED", 0) / 2000 == pytest.approx(expected, abs=tolerance)
 
 
+def test_rssi_is_equal_in_both_directions():
+    radio = replace(with_access("none"), shadowing=Shadowing(), fading=Fading())
+    result = run(make_medium(radio, 12), scattered(12) * [20, 20, 1], everybody(12), 1, 1)
+    links = {(s, r): rssi for s, r, rssi in result.rows("finished", "sender", "receiver", "rssi_dbm")}
+    both = [pair for pair in links if pair[::-1] in links]
+    assert len(both) > 50
+    assert all(links[pair] == links[pair[::-1]] for pair in both)
+
+
 @pytest.mark.parametrize("far_first", [True, False])
 def test_near_frame_of_two_is_received_as_in_ns3(far_first: bool):
     """ns-3's lr-wpan-collision-test: senders 1 m and 30 m away, one frame received, whoever has the lower row."""
@@ -52,6 +69,31 @@ def test_near_frame_of_two_is_received_as_in_ns3(far_first: bool):
     result = run(make_medium(with_access("aloha"), 3), at(*senders, (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
     assert result.fates() == {"RECEIVED": 1, "COLLIDED": 1}
     assert result.received("sender_index").tolist() == [int(far_first)]
+
+
+def test_equal_frames_at_once_are_both_lost_without_capture():
+    """One of IEEE 802.15.4 has as much, by its spreading: at 0 dB it hears 95 of 100 frames."""
+    radio = replace(with_access("aloha"), reception=Reception("threshold", min_sinr_db=3.0))
+    result = run(make_medium(radio, 3), at((-1, 0), (1, 0), (0, 0)), lambda _: packets([0, 1], 2), 1, 1)
+    assert result.fates() == {"COLLIDED": 2}
+
+
+def test_sender_hears_nothing_while_it_sends():
+    result = run(make_medium(with_access("aloha"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1)
+    assert result.fates() == {"COLLIDED": 2}
+    assert run(make_medium(with_access("none"), 2), at((0, 0), (1, 0)), everybody(2), 1, 1).fates() == {"RECEIVED": 2}
+
+
+def test_carrier_sense_lets_one_after_the_other_send():
+    """Three robots hand over two packets each at once, 20 times; of DCF, the first ones collide for certain."""
+    received = {}
+    for method in METHODS[1:]:
+        pose, sent = at((0, 0), (1, 0), (0.5, 1)), packets([0, 1, 2] * 2)
+        result = run(make_medium(with_access(method), 3), pose, lambda _, sent=sent: sent, 20, 1)
+        received[method] = result.fates().get("RECEIVED", 0) / 240
+    assert received["aloha"] == 0.0
+    assert received["csma-802154"] > 0.5
+    assert 0.3 < received["dcf"] <= 0.5
 
 
 @pytest.mark.parametrize("load", [0.25, 0.5, 1.0])
@@ -74,6 +116,18 @@ def test_aloha_throughput_matches_abramson(load: float):
     result = run(make_medium(radio, senders + 1), pose, lambda _: packets(range(senders), senders), ticks, 1)
     received = result.fates().get("RECEIVED", 0) / (senders * ticks)
     assert received == pytest.approx(np.exp(-2 * load), abs=0.03)
+
+
+@pytest.mark.parametrize("method", ["csma-802154", "dcf"])
+def test_acknowledged_packets_are_sent_again(method: str):
+    """Half of all frames, and of all acknowledgements, are lost: hardly a packet is, with three or seven retries."""
+    pose, sent = at((0, 0), (1, 0)), packets([0] * 5, 1)
+    for acknowledged, least, most in ((True, 0.9, 1.0), (False, 0.4, 0.6)):
+        radio = with_access(method)
+        radio = replace(radio, loss=0.5, access=replace(radio.access_or_default, acknowledged=acknowledged))
+        result = run(make_medium(radio, 2), pose, lambda _: sent, 60, 3)
+        assert least <= result.fates()["RECEIVED"] / 300 <= most
+        assert result.fates()["RECEIVED"] + result.fates().get("LOST", 0) == 300
 
 
 def test_csma_defers_to_a_frame_that_it_is_receiving():
@@ -145,6 +199,50 @@ def test_radio_graph_joins_robots_that_a_lone_packet_reaches():
     assert medium.step(1, pose, living([True, False, True])).edges.tolist() == []
 
 
+@given(signal_radios(), st.integers(2, 8), st.integers(0, 1000))
+def test_fates_add_up_when_robots_die_and_are_revived(radio: Radio, robots: int, seed: int):
+    rng = np.random.default_rng(seed)
+    medium = make_medium(radio, robots)
+    pose, tally = scattered(robots, seed) * [10.0, 10.0, 1.0], []
+    disruption = [random_disruption(robots, rng) for _ in range(6)]
+    for tick in range(6):
+        other = replace(radio, queue_limit=int(rng.integers(0, 4)), loss=0.2, antenna=Antenna(power_dbm=-3.0))
+        new_radio = other if rng.random() < 0.3 else None
+        tally.append(medium.step(tick * 10**8, pose, disruption[tick], new_radio).tally)
+        living = np.flatnonzero(disruption[tick].alive)
+        if len(living):
+            medium.send(tick * 10**8, tick, packets(rng.choice(living, 2 * robots)))
+    tally.append(medium.end())
+    assert sum(t.fates.sum() for t in tally) == sum(t.intended.sum() for t in tally)
+    assert min(t.fates.min() for t in tally) >= 0
+
+
+def random_disruption(robots: int, rng: np.random.Generator) -> Disruption:
+    """Some are dead, some have their radio off, some are kept apart."""
+    sides = rng.integers(0, 3, (1, robots))
+    one_way = rng.integers(0, 3, (int(rng.integers(0, 2)), robots))
+    backlog = rng.integers(0, 3, robots)
+    gain_db = rng.normal(0.0, 3.0, (2, robots))
+    jammers = random_jammers(robots, rng)
+    return Disruption(rng.random(robots) < 0.7, rng.random(robots) < 0.8, backlog, sides, one_way, *gain_db, jammers)
+
+
+def random_jammers(robots: int, rng: np.random.Generator) -> Jammers:
+    """Up to three in the one arena, some of them carried."""
+    k = int(rng.integers(0, 4))
+    period_ns = rng.integers(10**5, 10**8, k)
+    return Jammers(
+        arena=np.zeros(k, np.int64),
+        carrier=rng.integers(NO_ROBOT, robots, k),
+        x_m=rng.normal(0.0, 20.0, k),
+        y_m=rng.normal(0.0, 20.0, k),
+        power_dbm=rng.uniform(-60.0, 20.0, k),
+        on_ns=rng.integers(1, period_ns + 1),
+        period_ns=period_ns,
+        phase_ns=rng.integers(0, period_ns),
+    )
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_unfinished_packets_are_in_flight_at_the_end(method: str):
     """Two frames of each robot, the run over at their first bits."""
@@ -164,6 +262,14 @@ def test_full_queue_counts_receivers_in_range():
     result = run(make_medium(radio, 3), at((0, 0), (1, 0), (2, 0)), lambda _: packets([0] * 5), 1, 4)
     assert result.fates() == {"RECEIVED": 4, "QUEUE_FULL": 6}
     assert result.tally.in_range.tolist() == [10]
+
+
+def test_obstacle_blocks_only_with_line_of_sight():
+    pose = at((-1, -2), (-1, 2), (-2.8, -2))
+    for line_of_sight, fates in ((True, {"RECEIVED": 4, "BLOCKED": 2}), (False, {"RECEIVED": 6})):
+        radio = replace(with_access("none"), line_of_sight=line_of_sight)
+        result = run(make_medium(radio, 3, [1], [OBSTACLES]), pose, everybody(3), 1)
+        assert result.fates() == fates
 
 
 def test_packet_given_up_ticks_after_its_last_attempt_is_lost():
