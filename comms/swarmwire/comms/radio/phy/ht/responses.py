@@ -8,7 +8,7 @@ from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.phy.event_queue import CCA_END, SEND, SEND_ACK, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.ht import ppdu
-from swarmwire.comms.radio.phy.ht.params import ACK_BYTES, BASIC_RATE, BLOCK_ACK_BYTES, CTS_BYTES, REQUEST_ATTEMPTS
+from swarmwire.comms.radio.phy.ht.params import ACK_BYTES, BASIC_RATE, BLOCK_ACK_BYTES, CTS_BYTES, NO_LIMIT, REQUEST_ATTEMPTS
 from swarmwire.comms.radio.phy.ht.rate_control import report_failure, report_success
 from swarmwire.comms.radio.phy.ht.state import BLOCK_ACK, CTS
 from swarmwire.comms.radio.phy.ht.station import finish, put_on_air
@@ -76,7 +76,8 @@ def timer_expired(params, state, events, r, now_ns):
         station.request_to = station.to
         station.requests = 0 if station.count > 0 else station.requests + 1
         is_awaited = station.count > 0 or ppdu.count_request(state, r, station.to)
-        if not is_awaited and station.requests == REQUEST_ATTEMPTS:
+        limit = REQUEST_ATTEMPTS if params.ht.max_attempts == NO_LIMIT else 1
+        if not is_awaited and station.requests >= limit:
             station.request_to, station.requests = NO_ROBOT, 0
     if station.count > 0:
         report_failure(params, state, r, station.to)
