@@ -8,7 +8,14 @@ from swarmwire.comms.base.kernels import kernel
 from swarmwire.comms.base.sentinels import NO_ROBOT
 from swarmwire.comms.radio.phy.event_queue import CCA_END, SEND, SEND_ACK, TIMER, cancel, schedule
 from swarmwire.comms.radio.phy.ht import ppdu
-from swarmwire.comms.radio.phy.ht.params import ACK_BYTES, BASIC_RATE, BLOCK_ACK_BYTES, CTS_BYTES, NO_LIMIT, REQUEST_ATTEMPTS
+from swarmwire.comms.radio.phy.ht.params import (
+    ACK_BYTES,
+    BASIC_RATE,
+    BLOCK_ACK_BYTES,
+    CTS_BYTES,
+    NO_LIMIT,
+    REQUEST_ATTEMPTS,
+)
 from swarmwire.comms.radio.phy.ht.rate_control import report_failure, report_success
 from swarmwire.comms.radio.phy.ht.state import BLOCK_ACK, CTS
 from swarmwire.comms.radio.phy.ht.station import finish, put_on_air
