@@ -176,6 +176,16 @@ def test_radio_that_is_off_keeps_or_drops_its_packets(backlog: int):
     assert result.fates() == ({"RECEIVED": received} if received else {}) | lost
 
 
+def test_station_that_is_off_puts_nothing_on_air():
+    """It goes off in every second tick, at another point of an exchange each time, and keeps its packets."""
+    off, sent = Disruption.none(2), {0: packets([0] * 600, 1, 32)}
+    off.radio_on[0], off.backlog[0] = False, ALL
+    now = {tick: off if tick % 2 else Disruption.none(2) for tick in range(1, 31)}
+    result = run_disrupted(make_medium(crazyradio("250k"), 2), IN_LINE[:2], sent, now, 35)
+    assert result.fates() == {"RECEIVED": 600}
+    assert (result.finished("on_air_at_ns") // TICK_NS % 2 == 0).all()
+
+
 def test_revived_station_polls_again():
     """What it received in tick 0 is lost with it; what was sent while it was dead waits at the drones."""
     dead, sent = living([False, True, True]), {t: packets([1, 2], 0, 32) for t in range(4)}
