@@ -107,6 +107,7 @@ def test_frame_with_a_missing_key_is_malformed(key: str) -> None:
         *(("<f8", shape, bytes(16)) for shape in ([2, True], [-1, -2], [2**63])),
         ("<f8", [2**61 + 2], bytes(16)),  # 8 x this is 16, modulo 2^64
         *(("<f8", shape, bytes(15)) for shape in ([2], [1, 2])),
+        ("<f8", [], bytes(8)),
         *(("<f8", shape, b"") for shape in ([None], [-2, 0], [2**61], [2**32, 2**32], [0, 2**63], [2**63, 0])),
         *(("|b1", *item) for item in (([False], b""), ([2], b"\x01\x02"), ([1], b"\xff"), ([1, 2], b"\x01\x02"))),
         *(("<f4", [4], bytes(16)), ("<f8,<f8", [1], bytes(16)), ("|u1", [True], bytes(1))),
