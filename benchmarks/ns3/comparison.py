@@ -33,8 +33,8 @@ REASONS = {  # why rows are misses, by what their first cells match
     "receiver](../radio.md#noise-and-reception)",
     r"802.11n .* one spot, unicast$": "after A-MPDUs that collide, and for packets whose lifetime ends, ns-3 sends "
     "more requests of a block acknowledgement than a station here; single frames agree. Not traced further",
-    r"802.11n .* 40, 40 m, unicast": "packets of hidden senders wait longer here close to saturation; the cause was "
-    "not found. Delivery and full queues agree",
+    r"802.11n .* [24] 40, 40 m, unicast": "packets of hidden senders wait longer here close to saturation; the cause "
+    "was not found. Delivery and full queues agree",
 }
 Figures = dict[str, FloatArray]  # by name, (seeds,) each; NaN where nothing was received, or no pair is that far apart
 

@@ -41,15 +41,18 @@ from swarmwire.comms.radio.config.radio import POSITIONS
 
 RECORD = recorded()
 CONFIGURATIONS = [c for make in SECTIONS.values() for c in make()]
+REQUESTS = "40, 40 m, unicast, A-MPDU"  # block acknowledgements of hidden senders collide
 LONE = Configuration("802.15.4", 0.25, 2, 20, 0.01, "line", (110.0,), seeds=3, measured_s=1.0)
 STANDARD_ERRORS = 3.0  # two figures that differ by less, jointly, may stand in either order
 
 
 @pytest.mark.parametrize(
     "c",
-    # Full queues of 802.11n are a thousand frames a run and station.
+    # Full queues of 802.11n are a thousand frames a run and station. Only REQUESTS notices requests that are given up.
     [
-        pytest.param(c, marks=pytest.mark.slow) if c.standard == "802.11n" and c.is_saturated else c
+        pytest.param(c, marks=pytest.mark.slow)
+        if c.standard == "802.11n" and c.is_saturated and REQUESTS not in c.where
+        else c
         for c in CONFIGURATIONS
     ],
     ids=lambda c: " ".join(c.cells),
