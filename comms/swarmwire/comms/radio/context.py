@@ -85,5 +85,5 @@ class ChannelContext:
 
     @property
     def measured(self) -> TraceValues:
-        """What was measured on links, as input of kernels."""
+        """Measured values of links as input of kernels; none without a trace."""
         return NO_VALUES if self.traces is None else self.traces.values

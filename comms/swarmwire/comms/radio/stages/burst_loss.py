@@ -139,7 +139,7 @@ class BurstLoss(FrameLoss):
 
     def reserve(self, from_ns: int, links: int) -> Table:
         """Return the table, with room for `links` more links, for frames at `from_ns` or later."""
-        self._most_links += links
+        self._most_links += links  # a bound: most links are in the table already, so they are counted before it grows
         if 2 * self._most_links > len(self._states):
             self._most_links = len(self) + links
             if 2 * self._most_links > len(self._states):
