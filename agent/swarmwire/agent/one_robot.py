@@ -6,6 +6,7 @@ for one, as with the rays of a scan. The results equal those of `AgentExecutor`,
 """
 
 from collections.abc import Iterator, Mapping
+from math import isfinite
 from struct import Struct
 from typing import Any, cast
 
@@ -32,7 +33,7 @@ from swarmwire.agent.process_frames import (
     packet_struct,
 )
 from swarmwire.agent.robot import Robot
-from swarmwire.agent.step_context import TX_STATUS, DrawKeys, StepContext, StepTime, receiver_of
+from swarmwire.agent.step_context import TX_STATUS, DrawKeys, StepContext, StepTime, check_note, receiver_of
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
 from swarmwire.comms.robot.packets import NO_TX_STATUSES, TAG_BYTES, TxStatuses
@@ -87,6 +88,7 @@ class RobotContext(StepContext):
         self._agent, self._frame, self._received, self._statuses = agent, frame, packets, statuses
         self._command: tuple[float, float, float, float] = NO_COMMAND
         self._outbox: list[tuple[tuple[int, int, int, int], bytes]] = []
+        self._notes: dict[str, Any] = {}  # noted in this tick, as in `Extras`
         self._lists: OneRobotLists | None = None
 
     def reading(self, sensor: SensorProperty[Any, Any], index: int) -> list[Any]:
@@ -134,10 +136,21 @@ class RobotContext(StepContext):
         self._outbox.append(((self._agent.row, receiver, tx_status_id, len(payload)), payload))
         return id_
 
+    def note_one(self, index: int, state: str | None, value: float | None) -> None:
+        """Note the robot's state, and a number; ValueError as `check_note`, and for a number that is not finite."""
+        check_note(state, value)
+        rows = [self._agent.row]
+        if value is not None:
+            if not isfinite(value):
+                raise ValueError(f"note(value=…): expected finite numbers, got {value!r}")
+            self._notes["values"] = rows, [0], [value]
+        if state is not None:
+            self._notes["notes"] = rows, [state]
+
     def end(self, robots: int = 1) -> bytes:
         """Return the frame "actions"; the handle of this tick raises RuntimeError from now on."""
         agent, outbox = self._agent, self._outbox
-        extras = self._extras() if robots and (self._tables or agent.keeps_memory) else b""
+        extras = self._extras() if robots and (self._tables or self._notes or agent.keeps_memory) else b""
         if outbox:
             payloads = b"".join([payload for _, payload in outbox])
             sent = b"".join([SENT_PACKET.pack(*head) for head, _ in outbox]) + payloads
@@ -154,21 +167,16 @@ class RobotContext(StepContext):
 
     def end_receive(self) -> bytes:
         """Return a frame "actions" with the packets of `on_receive` alone; RuntimeError if the robot did more."""
-        if self._command[0] or self._tables:
+        if self._command[0] or self._tables or self._notes:
             raise RuntimeError("on_receive(…) reads packets and sends; to drive, light, actuate or note is for step(…)")
         return self.end(robots=0)
 
     def _extras(self) -> bytes:
         """Return the sparse tables and the memory."""
-        extras: dict[str, Any] = {}
+        extras = self._notes
         for name, values in self._tables.items():
             (slots,) = np.nonzero(~np.isnan(values[0]))
-            rows, numbers = [self._agent.row] * len(slots), values[0, slots].tolist()
-            if name == "notes":
-                states = list(self._states)
-                extras[name] = rows, [states[int(index)] for index in numbers]
-            else:
-                extras[name] = rows, slots.tolist(), numbers
+            extras[name] = [self._agent.row] * len(slots), slots.tolist(), values[0, slots].tolist()
         return extras_data(extras, self._agent.memory() if self._agent.keeps_memory else None)
 
 

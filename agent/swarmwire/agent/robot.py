@@ -75,7 +75,7 @@ class Robot(RobotHandle[float]):
         until the next note. ValueError if both are None, for a state that is no short text, for a number that is not
         finite.
         """
-        self._context.note(slice(self._row, self._row + 1), state, None if value is None else float(value))
+        self._context.note_one(self._row, state, None if value is None else float(value))
 
     def _reading(self, sensor: SensorProperty[Any, Any]) -> Any:
         values = self._context.reading(sensor, self._row)

@@ -51,7 +51,6 @@ class StepContext(ABC):
         self.keys, self.first_draw = draw_keys
         self.n = len(self.keys)
         self._needs_tx_status = TX_STATUS in needs
-        self._states: dict[str, int] = {}  # index of each state that was noted in this tick
         self._tables: dict[str, FloatArray] = {}  # values by name in TABLES, (n, slots); nan: not set in this tick
 
     @abstractmethod
@@ -82,28 +81,12 @@ class StepContext(ABC):
     def send_one(self, index: int, to: int | None, payload: bytes) -> int:
         """Queue a packet of one robot; return its id."""
 
-    def note(self, rows: BoolArray | slice, state: str | None, value: ArrayLike | None) -> None:
-        """Note a state of some robots, and a number: (n,) or one for all. The last note of a tick counts.
+    @abstractmethod
+    def note_one(self, index: int, state: str | None, value: float | None) -> None:
+        """Note a state of one robot, and a number; the last note of a tick counts.
 
-        ValueError if both are None, for a state that is no short text, and for numbers of a wrong shape or not finite.
+        ValueError as `check_note`, and for a number that is not finite.
         """
-        if state is None and value is None:
-            raise ValueError("note(…): expected a state, a value, or both")
-        numbers = None if value is None else self._numbers(rows, value)
-        if state is not None:
-            self._table("notes", 1)[rows, 0] = self._states.setdefault(checked_state(state), len(self._states))
-        if numbers is not None:
-            self._table("values", 1)[rows, 0] = numbers
-
-    def _numbers(self, rows: BoolArray | slice, value: ArrayLike) -> FloatArray:
-        """Return the numbers of these rows; ValueError for a wrong shape, or if one is not finite."""
-        numbers = np.asarray(value, np.float64)
-        if numbers.ndim and numbers.shape != (self.n,):
-            raise ValueError(f"note(value=…): expected one number or {self.n}, got the shape {numbers.shape}")
-        numbers = np.broadcast_to(numbers, self.n)[rows]
-        if not np.isfinite(numbers).all():
-            raise ValueError(f"note(value=…): expected finite numbers, got {value!r}")
-        return numbers
 
     def leds(self, index: int | None) -> FloatArray:
         """Return the new colours of one LED of each body, or of all, (n, leds), to write into.
@@ -158,6 +141,14 @@ class StepContext(ABC):
             raise undeclared(need, self.needs)
 
 
+def check_note(state: str | None, value: object) -> None:
+    """Raise ValueError for a note without content, or with a state that is no short text."""
+    if state is None and value is None:
+        raise ValueError("note(…): expected a state, a value, or both")
+    if state is not None:
+        checked_state(state)
+
+
 def receiver_of(to: int | None) -> int:
     """Return the number of the receiver in a frame; ValueError unless `to` is None or the index of a robot."""
     if to is None:
@@ -192,6 +183,7 @@ class GroupContext(StepContext):
         self.linear_mps, self.angular_radps, self.lateral_mps = np.zeros((3, self.n))
         self._sent_counts = sent_counts
         self._outbox: list[SentPackets] = []
+        self._states: dict[str, int] = {}  # index of each state that was noted in this tick
         self._packets: dict[type[Message], Packets[Any]] = {}
         self._lists: ReceivedLists | None = None
 
@@ -276,6 +268,32 @@ class GroupContext(StepContext):
         sender = self.readings.rows[index : index + 1]
         self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.from_row(payload), tx_status_id))
         return id_
+
+    def note(self, rows: BoolArray | slice, state: str | None, value: ArrayLike | None) -> None:
+        """Note a state of some robots, and a number: (n,) or one for all. The last note of a tick counts.
+
+        ValueError as `check_note`, and for numbers of a wrong shape or not finite.
+        """
+        check_note(state, value)
+        numbers = None if value is None else self._numbers(rows, value)
+        if state is not None:
+            self._table("notes", 1)[rows, 0] = self._states.setdefault(state, len(self._states))
+        if numbers is not None:
+            self._table("values", 1)[rows, 0] = numbers
+
+    def note_one(self, index: int, state: str | None, value: float | None) -> None:
+        """Note a state of one robot, and a number; ValueError as `note`."""
+        self.note(slice(index, index + 1), state, value)
+
+    def _numbers(self, rows: BoolArray | slice, value: ArrayLike) -> FloatArray:
+        """Return the numbers of these rows; ValueError for a wrong shape, or if one is not finite."""
+        numbers = np.asarray(value, np.float64)
+        if numbers.ndim and numbers.shape != (self.n,):
+            raise ValueError(f"note(value=…): expected one number or {self.n}, got the shape {numbers.shape}")
+        numbers = np.broadcast_to(numbers, self.n)[rows]
+        if not np.isfinite(numbers).all():
+            raise ValueError(f"note(value=…): expected finite numbers, got {value!r}")
+        return numbers
 
     def mask(self, rows: BoolArray) -> BoolArray:
         """Return the mask of a VectorAgent; TypeError unless it is bool (n,)."""
