@@ -36,7 +36,7 @@ from swarmwire.agent.robot import Robot
 from swarmwire.agent.step_context import TX_STATUS, DrawKeys, StepContext, StepTime, check_note, receiver_of
 from swarmwire.comms.base.clock import tick_start_ns
 from swarmwire.comms.base.sentinels import BROADCAST, NO_TX_STATUS
-from swarmwire.comms.robot.packets import NO_TX_STATUSES, TAG_BYTES, TxStatuses
+from swarmwire.comms.robot.packets import TAG_BYTES
 from swarmwire.comms.robot.sensors.sensor import SensorProperty
 from swarmwire.comms.wire.agent_memory import GroupMemories, GroupMemory
 from swarmwire.comms.wire.assignment import Assignment
@@ -89,6 +89,7 @@ class RobotContext(StepContext):
         self._command: tuple[float, float, float, float] = NO_COMMAND
         self._outbox: list[tuple[tuple[int, int, int, int], bytes]] = []
         self._notes: dict[str, Any] = {}  # noted in this tick, as in `Extras`
+        self._leds: dict[int, float] = {}  # colours that were set in this tick, by LED
         self._lists: OneRobotLists | None = None
 
     def reading(self, sensor: SensorProperty[Any, Any], index: int) -> list[Any]:
@@ -116,13 +117,10 @@ class RobotContext(StepContext):
             self._lists = OneRobotLists(self._received, self._agent.measures, self.needs)
         return self._lists
 
-    def tx_status(self) -> TxStatuses:
-        """Return tx statuses of packets that the robot sent; NotDeclared if the agent's needs do not name them."""
+    def tx_statuses_of(self, index: int) -> list[tuple[int, int]]:
+        """Return id and result of packets that the robot sent; NotDeclared if the agent's needs do not name them."""
         self._require(TX_STATUS)
-        if not self._statuses:
-            return NO_TX_STATUSES
-        _, ids, results = np.array(self._statuses).T
-        return TxStatuses(np.zeros(len(ids), np.int64), ids, results)
+        return [(id_, result) for _, id_, result in self._statuses]
 
     def command(self, index: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
         """Command the robot's speeds; the last command of a tick counts."""
@@ -135,6 +133,11 @@ class RobotContext(StepContext):
         tx_status_id = id_ if receiver != BROADCAST and self._needs_tx_status else NO_TX_STATUS
         self._outbox.append(((self._agent.row, receiver, tx_status_id, len(payload)), payload))
         return id_
+
+    def led_one(self, index: int, led: int | None, rgb: int) -> None:
+        """Set the colour of one LED, or of all; the last colour counts. Errors as `led_slots`."""
+        slots = self.led_slots(led)
+        self._leds.update(dict.fromkeys(range(slots.start, slots.stop), float(rgb)))
 
     def note_one(self, index: int, state: str | None, value: float | None) -> None:
         """Note the robot's state, and a number; ValueError as `check_note`, and for a number that is not finite."""
@@ -150,7 +153,7 @@ class RobotContext(StepContext):
     def end(self, robots: int = 1) -> bytes:
         """Return the frame "actions"; the handle of this tick raises RuntimeError from now on."""
         agent, outbox = self._agent, self._outbox
-        extras = self._extras() if robots and (self._tables or self._notes or agent.keeps_memory) else b""
+        extras = self._extras() if robots and (self._sets_more or agent.keeps_memory) else b""
         if outbox:
             payloads = b"".join([payload for _, payload in outbox])
             sent = b"".join([SENT_PACKET.pack(*head) for head, _ in outbox]) + payloads
@@ -167,16 +170,24 @@ class RobotContext(StepContext):
 
     def end_receive(self) -> bytes:
         """Return a frame "actions" with the packets of `on_receive` alone; RuntimeError if the robot did more."""
-        if self._command[0] or self._tables or self._notes:
+        if self._command[0] or self._sets_more:
             raise RuntimeError("on_receive(…) reads packets and sends; to drive, light, actuate or note is for step(…)")
         return self.end(robots=0)
 
+    @property
+    def _sets_more(self) -> bool:
+        """True if the agent set more than its command and packets."""
+        return bool(self._notes or self._leds or self._tables)
+
     def _extras(self) -> bytes:
         """Return the sparse tables and the memory."""
-        extras = self._notes
+        extras, row = self._notes, self._agent.row
+        if self._leds:
+            leds = sorted(self._leds)
+            extras["leds"] = [row] * len(leds), leds, [self._leds[led] for led in leds]
         for name, values in self._tables.items():
             (slots,) = np.nonzero(~np.isnan(values[0]))
-            extras[name] = [self._agent.row] * len(slots), slots.tolist(), values[0, slots].tolist()
+            extras[name] = [row] * len(slots), slots.tolist(), values[0, slots].tolist()
         return extras_data(extras, self._agent.memory() if self._agent.keeps_memory else None)
 
 

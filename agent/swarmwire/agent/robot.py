@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 from swarmwire.agent.packet import Packet, TxStatus
 from swarmwire.agent.robots import Draw, RobotHandle
 from swarmwire.agent.step_context import StepContext
-from swarmwire.comms.base.arrays import IntArray
-from swarmwire.comms.robot.bodies.drives import rgb_of, twist_of_wheels
+from swarmwire.comms.robot.bodies.drives import rgb_of_one, twist_of_wheels
 from swarmwire.comms.robot.messages import DICT_TAG, Message, dict_in, encode_dict, message_class
 from swarmwire.comms.robot.packets import TxResult
 from swarmwire.comms.robot.sensors.sensor import CustomReading, SensorProperty
@@ -32,8 +31,8 @@ class Robot(RobotHandle[float]):
     def draw(self) -> Draw:
         """The robot's random draws."""
         if self._draw is None:
-            keys = self._context.keys[self._row : self._row + 1]
-            self._draw = Draw(keys, self._context.tick, self._context.first_draw)
+            context = self._context
+            self._draw = Draw(int(context.keys[self._row]), context.tick, context.first_draw)
         return self._draw
 
     def sensor(self, name: str) -> CustomReading:
@@ -59,7 +58,7 @@ class Robot(RobotHandle[float]):
 
         The colour lasts until the next call. IncompatibleBody if the body has no LEDs, ValueError if it lacks this one.
         """
-        self._context.leds(index)[self._row] = rgb_of(red, green, blue)
+        self._context.led_one(self._row, index, rgb_of_one(red, green, blue))
 
     def actuate(self, name: str, values: ArrayLike) -> None:
         """Set a custom actuator to one number or to (width,); it defines their effect and its duration.
@@ -116,14 +115,8 @@ class RadioPort:
     @property
     def tx_status(self) -> list[TxStatus]:
         """Results of unicast packets since the robot's last step, by id."""
-        table = self._context.tx_status()
-        ids, results = table.id.tolist(), table.result.tolist()
-        return [TxStatus(ids[index], TxResult(results[index])) for index in self._span(table.row)]
-
-    def _span(self, row: IntArray) -> range:
-        if not len(row):
-            return range(0)
-        return range(int(row.searchsorted(self._row)), int(row.searchsorted(self._row + 1)))
+        statuses = self._context.tx_statuses_of(self._row)
+        return [TxStatus(id_, TxResult(result)) for id_, result in statuses]
 
 
 def _encoded(message: object) -> bytes:

@@ -49,13 +49,26 @@ class RobotHandle(Sensors[N]):
         return self._context.group.body
 
 
-class Draws:
+class _Calls:
+    """The number of calls for each purpose in one tick."""
+
+    def __init__(self, first: int) -> None:
+        """Begin; `first` numbers the first call for each purpose, above those of earlier draws in this tick."""
+        self._first = first
+        self._calls: dict[str, int] = {}
+
+    def _count(self, purpose: str) -> int:
+        call = self._calls.get(purpose, self._first)
+        self._calls[purpose] = call + 1
+        return call
+
+
+class Draws(_Calls):
     """Draws of n robots in one tick; a second call for a purpose gives new values."""
 
     def __init__(self, keys: KeyArray, tick: int, first: int = 0) -> None:
-        """Begin; `first` numbers the first call for each purpose, above those of earlier draws in this tick."""
-        self._keys, self._tick, self._first = keys, tick, first
-        self._calls: dict[str, int] = {}
+        super().__init__(first)
+        self._keys, self._tick = keys, tick
 
     def uniform(self, purpose: str, low: float = 0.0, high: float = 1.0) -> FloatArray:
         """Uniform in [low, high), (n,)."""
@@ -67,25 +80,23 @@ class Draws:
         unit = draws.normal(self._keys, self._tick, self._count(purpose), 0, draws.purpose(purpose))
         return mean + deviation * unit
 
-    def _count(self, purpose: str) -> int:
-        call = self._calls.get(purpose, self._first)
-        self._calls[purpose] = call + 1
-        return call
 
-
-class Draw:
+class Draw(_Calls):
     """Draws of one robot in one tick; a second call for a purpose gives a new value."""
 
-    def __init__(self, keys: KeyArray, tick: int, first: int = 0) -> None:
-        self._rows = Draws(keys, tick, first)
+    def __init__(self, key: int, tick: int, first: int = 0) -> None:
+        super().__init__(first)
+        self._key, self._tick = key, tick
 
     def uniform(self, purpose: str, low: float = 0.0, high: float = 1.0) -> float:
         """Uniform in [low, high)."""
-        return float(self._rows.uniform(purpose, low, high)[0])
+        unit = draws.uniform_one(self._key, self._tick, self._count(purpose), 0, draws.purpose(purpose))
+        return low + (high - low) * unit
 
     def normal(self, purpose: str, mean: float = 0.0, deviation: float = 1.0) -> float:
         """Normal with this mean and standard deviation."""
-        return float(self._rows.normal(purpose, mean, deviation)[0])
+        unit = draws.normal_one(self._key, self._tick, self._count(purpose), 0, draws.purpose(purpose))
+        return mean + deviation * unit
 
 
 class Robots(RobotHandle[FloatArray]):

@@ -70,8 +70,8 @@ class StepContext(ABC):
         """Packets that these robots received, for agents of one robot each."""
 
     @abstractmethod
-    def tx_status(self) -> TxStatuses:
-        """Return tx statuses of packets that these robots sent; NotDeclared if the agent's needs do not name them."""
+    def tx_statuses_of(self, index: int) -> list[tuple[int, int]]:
+        """Return id and result of packets that one robot sent; NotDeclared if the agent's needs do not name them."""
 
     @abstractmethod
     def command(self, index: int, linear_mps: float, angular_radps: float, lateral_mps: float) -> None:
@@ -88,18 +88,18 @@ class StepContext(ABC):
         ValueError as `check_note`, and for a number that is not finite.
         """
 
-    def leds(self, index: int | None) -> FloatArray:
-        """Return the new colours of one LED of each body, or of all, (n, leds), to write into.
+    @abstractmethod
+    def led_one(self, index: int, led: int | None, rgb: int) -> None:
+        """Set the colour of one LED of one robot, or of all; the last colour counts. Errors as `led_slots`."""
 
-        IncompatibleBody if the body has no LEDs, ValueError if it lacks this one.
-        """
+    def led_slots(self, led: int | None) -> slice:
+        """Return one LED of the body, or all; IncompatibleBody if it has no LEDs, ValueError if it lacks this one."""
         body = self.group.body
         if not body.led_count:
             raise IncompatibleBody(f"the body {body.name} has no LEDs")
-        if index is not None and not 0 <= index < body.led_count:
-            raise ValueError(f"led(index=…): the body {body.name} has LEDs 0 to {body.led_count - 1}, got {index}")
-        leds = self._table("leds", body.led_count)
-        return leds if index is None else leds[:, index : index + 1]
+        if led is not None and not 0 <= led < body.led_count:
+            raise ValueError(f"led(index=…): the body {body.name} has LEDs 0 to {body.led_count - 1}, got {led}")
+        return slice(0, body.led_count) if led is None else slice(led, led + 1)
 
     def actuate(self, name: str, values: ArrayLike, rows: slice, mask: BoolArray | None = None) -> None:
         """Set a custom actuator of some robots to numbers (rows, width), or a shape that broadcasts to it.
@@ -207,6 +207,12 @@ class GroupContext(StepContext):
         self._require(TX_STATUS)
         return self._tx_status
 
+    def tx_statuses_of(self, index: int) -> list[tuple[int, int]]:
+        """Return id and result of packets that one robot sent; NotDeclared if the agent's needs do not name them."""
+        statuses = self.tx_status()
+        span = slice(*statuses.row.searchsorted((index, index + 1)).tolist())
+        return [*zip(statuses.id[span].tolist(), statuses.result[span].tolist(), strict=True)]
+
     def packets(self, kind: type[M]) -> Packets[M]:
         """Return all packets of a message class that these robots received."""
         packets = self._packets.get(kind)
@@ -268,6 +274,18 @@ class GroupContext(StepContext):
         sender = self.readings.rows[index : index + 1]
         self._outbox.append(SentPackets(sender, np.array((receiver,)), Payloads.from_row(payload), tx_status_id))
         return id_
+
+    def leds(self, led: int | None) -> FloatArray:
+        """Return the new colours of one LED of each body, or of all, (n, leds), to write into.
+
+        Errors as `led_slots`.
+        """
+        slots = self.led_slots(led)
+        return self._table("leds", self.group.body.led_count)[:, slots]
+
+    def led_one(self, index: int, led: int | None, rgb: int) -> None:
+        """Set the colour of one LED of one robot, or of all; the last colour counts. Errors as `led_slots`."""
+        self.leds(led)[index] = rgb
 
     def note(self, rows: BoolArray | slice, state: str | None, value: ArrayLike | None) -> None:
         """Note a state of some robots, and a number: (n,) or one for all. The last note of a tick counts.

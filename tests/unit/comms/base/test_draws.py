@@ -33,9 +33,10 @@ def test_philox_matches_the_known_answers_of_random123(counter: str, key: str, e
 
 @pytest.mark.parametrize("name", ["uniform", "normal"])
 @given(KEYS, COUNTERS)
-def test_draw_is_bit_identical_in_numpy_and_compiled(name: str, key: int, c: tuple[int, int, int, int]) -> None:
+def test_draw_is_bit_identical_in_numpy_python_and_compiled(name: str, key: int, c: tuple[int, int, int, int]) -> None:
     compiled = getattr(draws_compiled, name)(np.uint64(key), *(np.uint64(i) for i in c))
     assert float(getattr(draws, name)(key, *c)).hex() == float(compiled).hex()
+    assert getattr(draws, f"{name}_one")(key, *c).hex() == float(compiled).hex()
 
 
 def test_normal_is_bit_identical_far_into_the_tails() -> None:

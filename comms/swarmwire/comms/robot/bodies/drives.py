@@ -141,6 +141,16 @@ class Leds:
         return position
 
 
+def rgb_of_one(red: float, green: float, blue: float) -> int:
+    """Return one colour 0xRRGGBB from components in [0, 1]; ValueError if a component is out of range."""
+    rgb = 0
+    for level in (red, green, blue):
+        if not 0.0 <= level <= 1.0:
+            raise ValueError(f"led(red, green, blue): expected numbers from 0 to 1, got {level}")
+        rgb = (rgb << 8) + round(255.0 * level)
+    return rgb
+
+
 def rgb_of(red: ArrayLike, green: ArrayLike, blue: ArrayLike) -> IntArray:
     """Return colours 0xRRGGBB from components in [0, 1] of any shape; ValueError if a component is out of range."""
     rgb: IntArray = np.zeros((), np.int64)
