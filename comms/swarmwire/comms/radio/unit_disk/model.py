@@ -81,6 +81,7 @@ def decide(
     row = np.full(used[0], ABSENT)  # first link of each packet that is due
     in_range, remaining = np.zeros(used[0], np.int64), np.empty(used[0], np.int64)
     end, due, waiting = link_used[0], 0, 0
+    measured = before.losses.measured  # here: an attribute counts references, atomically, each time that it is read
     for p in range(used[0]):
         packet = packets[p]
         if not leave_queue(packet, until_ns, cuts):
@@ -119,7 +120,7 @@ def decide(
                 link.in_range, link.final_at_ns, link.rssi_dbm = is_in_range, at_ns, np.nan
                 link.fate = RECEIVED if fate == UNDER_WAY else fate
                 if fate == UNDER_WAY:
-                    after_reception(after, before.losses.measured, pose, frame, link)
+                    after_reception(after, measured, pose, frame, link)
     for p in range(used[0]):
         if row[p] != ABSENT:
             packet = packets[p]
