@@ -33,21 +33,21 @@ TARGETS = {
     "inprocess-1000-d1-radio": Target(470_000, "d1 with a 10-byte broadcast of each robot and tick (ARGoS: 25,000)"),
     "inprocess-1000-d4-radio": Target(310_000, "d4 with a broadcast (ARGoS, where bodies block: 8,800)"),
     "inprocess-10000-d1": Target(1_850_000, "10,000 foot-bots (ARGoS: 63,000)"),
-    "inprocess-100000-d1": Target(1, "100,000 foot-bots at 10 Hz"),
+    "inprocess-100000-d1": Target(1.25, "100,000 foot-bots at 10 Hz"),
     "laser-1000": Target(14, "1,000 TurtleBots, 360 rays of 3.5 m at 5 Hz with noise"),
     "single-10": Target(800, "one run of 10 foot-bots"),
     "single-10-radio": Target(500, "the same with a broadcast of each robot and tick"),
     "replicas-100x10": Target(1_650_000, "100 arenas of 10 foot-bots side by side"),
-    "wire-1000x2": Target(110_000, "`inprocess-1000-d1-radio`, its agents in 2 runner processes"),
+    "wire-1000x2": Target(142_000, "`inprocess-1000-d1-radio`, its agents in 2 runner processes"),
     "learn-100x10": Target(
-        360_000, "100 arenas of 10 e-pucks as an environment: physics, rays, broadcasts, observation, reward"
+        405_000, "100 arenas of 10 e-pucks as an environment: physics, rays, broadcasts, observation, reward"
     ),
     "learn-1000x10": Target(520_000, "1,000 of them"),
     "start-1000": most(
-        0.02, "from the call to the first tick of a world with a radio, kernels cached, imports left out"
+        0.012, "from the call to the first tick of a world with a radio, kernels cached, imports left out"
     ),
-    "agent-overhead-step": most(20, "what an `Agent` costs in a step beyond its own code, alone with nothing received"),
-    "agent-overhead-packet": most(2.5, "and for each packet that it reads"),
+    "agent-overhead-step": most(13, "what an `Agent` costs in a step beyond its own code, alone with nothing received"),
+    "agent-overhead-packet": most(2.15, "and for each packet that it reads"),
     "record-cost": most(1.10, "`inprocess-1000-d1` for 600 ticks with its ticks and metrics recorded and joined"),
     "record-cost-size": most(8, "Parquet of that run"),
     "view-cost": most(15, "the same, recorded for the viewer; without a radio, so of a short tick"),
@@ -62,20 +62,20 @@ TARGETS = {
     "radio-802154-1000-threads": Target(32, "the same with two threads"),
     "radio-disk-1000": Target(250, "1,000 robots over a disk, 9 in range"),
     "radio-wifi-80": Target(105, "80 robots in one spot over `wifi-a-6M`, 128 bytes: 100 times ns-3's wheel"),
-    "radio-wifi-80-standing": Target(105, "the same, of robots that stand"),
+    "radio-wifi-80-standing": Target(185, "the same, of robots that stand"),
     "radio-scaling": most(1.5, "the first with 100, 1,000 and 10,000 robots: the dearest link over the cheapest"),
     "line-of-sight-9500": most(
-        5, "a tick of the medium: 1,000 robots, 7,800 links within range of a unit disk, a map of 9,500 boxes"
+        3.7, "a tick of the medium: 1,000 robots, 7,800 links within range of a unit disk, a map of 9,500 boxes"
     ),
     "campaign-1000x10": most(
         8, "1,000 runs of 10 robots x 600 ticks with radio and metrics, from the call to the table, on 2 cores"
     ),
     "processes-100": Target(8, "100 e-pucks that flock, each an `Agent` in plain Python in its own process"),
-    "processes-100-start": most(1, "from the call to the first tick, imports left out"),
+    "processes-100-start": most(0.53, "from the call to the first tick, imports left out"),
     "processes-100-uss": most(5, "memory that a runner does not share with others"),
     "processes-200": Target(5, "200 e-pucks that flock, each an `Agent` in plain Python, about 10 packets received"),
     "processes-1000": Target(1.0, "1,000 of them"),
-    "processes-1000-start": most(4, "from the call to the first tick, imports left out"),
+    "processes-1000-start": most(2.9, "from the call to the first tick, imports left out"),
     "processes-1000-memory": most(4, "of world, agent host and runners together, as sum of their PSS"),
     "wire-over-floor": most(
         1.6,
@@ -88,14 +88,16 @@ TARGETS = {
         3, "20 robots that send 50 frames of 200 bytes a second: 99 % are delivered no later than so after due"
     ),
     "interfaces-disk-cpu": most(60, "CPU of the world for a frame, beyond that of the same run without interfaces"),
-    "interfaces-wifi": most(3, "the same over `wifi-a-6M`"),
+    "interfaces-wifi": most(2, "the same over `wifi-a-6M`"),
     "interfaces-wifi-cpu": most(60, "its CPU"),
-    "interfaces-start-50": most(2, "50 robots with an interface and a program each, from the call to the first tick"),
-    "trace-1000": most(3, "reading a trace in Parquet: 1,000 robots, an hour, 10 samples a second"),
-    "trace-1000-share": most(5, "its poses, of a tick over a disk, 9 in range"),
-    "poses-udp-100": most(10, "processor of the world for poses of 100 robots at 50 Hz"),
+    "interfaces-start-50": most(
+        1.43, "50 robots with an interface and a program each, from the call to the first tick"
+    ),
+    "trace-1000": most(1.4, "reading a trace in Parquet: 1,000 robots, an hour, 10 samples a second"),
+    "trace-1000-share": most(1.7, "its poses, of a tick over a disk, 9 in range"),
+    "poses-udp-100": most(4.3, "processor of the world for poses of 100 robots at 50 Hz"),
     "poses-udp-use": most(
-        2,
+        1.3,
         "99 % of them are used no later after arrival, by the time of a radio with 1 ms sub-ticks",
     ),
     "tls-cost": most(
@@ -110,7 +112,7 @@ TARGETS = {
     "robot-step-memory": most(60, "the most memory that the process of such an agent held"),
     "robot-step-ros2": most(1, "the same on a TurtleBot behind a bridge of ROS 2"),
     "robot-step-ros2-memory": most(60, "the most memory of its process"),
-    "deploy-20": most(6, "a new release to twenty hosts at once over OpenSSH, all on one machine, a trial run each"),
+    "deploy-20": most(5.3, "a new release to twenty hosts at once over OpenSSH, all on one machine, a trial run each"),
     "report-10000": most(8, "`swarmwire report` of 50 points x 200 seeds with 10 responses, from the call to its end"),
     "report-10000-memory": most(700, "the most memory that it held"),
 }
