@@ -236,6 +236,11 @@ def test_observer_frame_of_another_version_is_refused(version):
             decode_truth(other, SCENE) if kind == "truth" else decode_scene(other)
 
 
+def test_scene_of_a_run_at_the_lowest_rate_is_read():
+    slow = replace(SCENE, static=replace(STATIC, rate_hz=1))
+    assert decode_scene(frames.decode(encode_scene(slow))).static.rate_hz == 1
+
+
 def test_observer_frame_of_another_kind_is_refused():
     with pytest.raises(BadFrame, match="expected truth"):
         decode_truth(frames.decode(encode_scene(SCENE)), SCENE)
