@@ -131,7 +131,8 @@ def test_tick_that_arrives_before_the_answer_waits_for_it() -> None:
 
 
 def test_ticks_in_which_no_group_acts_are_dropped() -> None:
-    groups = [{**REPLY["groups"][0], "name": name, "act_every_ticks": every} for name, every in (("a", 4), ("b", 6))]
+    group, periods = REPLY["groups"][0], (("a", 0, 4), ("b", 1, 6))
+    groups = [{**group, "name": name, "rows": [row], "act_every_ticks": every} for name, row, every in periods]
     protocol = playing(*(tick(number, "a") for number in range(4)), reply={**REPLY, "groups": groups})
     assert next_tick(protocol) == 2
     assert answer(protocol) == (2, 3)

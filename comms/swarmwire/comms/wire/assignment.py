@@ -79,7 +79,13 @@ class Assignment:
     def from_mapping(cls, mapping: dict[str, Any]) -> "Assignment":
         """Make the assignment from the result of `as_mapping`; BadFrame for other values."""
         frame = typed(_AssignmentFrame, mapping, "assignment")
-        return cls(tuple(map(_group, frame.groups)), frame.rate_hz, frame.measures)
+        groups = tuple(map(_group, frame.groups))
+        if len({group.name for group in groups}) < len(groups):
+            raise BadFrame("malformed", "groups: expected each name once")
+        rows = [row for group in groups for row in group.rows.tolist()]
+        if len({*rows}) < len(rows):
+            raise BadFrame("malformed", "rows: expected each robot in one group")
+        return cls(groups, frame.rate_hz, frame.measures)
 
 
 PositiveInt = Annotated[int, Meta(ge=1, lt=2**31)]

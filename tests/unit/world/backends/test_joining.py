@@ -87,6 +87,14 @@ def test_malformed_assignment_is_refused_with_its_key(changed: dict[str, Any], k
         Assignment.from_mapping(mapping)
 
 
+@pytest.mark.parametrize(("changed", "key"), [({"rows": [2, 3]}, "groups: "), ({"name": "other"}, "rows: ")])
+def test_assignment_with_a_group_or_a_robot_twice_is_refused(changed: dict[str, Any], key: str) -> None:
+    mapping = assignment(group("a.b:C", [1, 4])).as_mapping()
+    mapping["groups"].append(mapping["groups"][0] | changed)
+    with refused_frame("malformed", re.escape(key)):
+        Assignment.from_mapping(mapping)
+
+
 BAD_NAMES = ("", "a/b", "*", "**", "a*", "$*", "a?b", "a#b", "ä", "a b", "a\n", "x" * 65)
 
 
