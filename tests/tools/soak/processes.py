@@ -28,9 +28,14 @@ class Supervised:
     """
 
     def __init__(
-        self, name: str, command: Callable[[], Sequence[str]], log: Path, env: Mapping[str, str], again_s: float = 0.0
+        self,
+        name: str,
+        command: Callable[[], Sequence[str]],
+        log: Path,
+        env: Mapping[str, str],
+        again_s: float | None = None,
     ) -> None:
-        """`command` is called at each start; the process is restarted `again_s` after its end."""
+        """`command` is called at each start; the process is restarted `again_s` after its end, if at all."""
         self.name, self.again_s, self.starts, self.codes = name, again_s, 0, list[int]()
         self._command, self._log, self._env = command, log, env
         self._process: subprocess.Popen[bytes] | None = None
@@ -42,7 +47,7 @@ class Supervised:
         if self._process is not None and (code := self._process.poll()) is not None:
             self.codes.append(code)
             self._process, self.frozen = None, False
-            if self._due_ns is None:
+            if self._due_ns is None and self.again_s is not None:
                 self._due_ns = now_ns + to_ns(self.again_s)
         if self._process is None and self._due_ns is not None and now_ns >= self._due_ns:
             self._due_ns = None
@@ -53,8 +58,7 @@ class Supervised:
 
     def stay_away(self) -> None:
         """Restart it no more."""
-        self.again_s = float("inf")
-        self._due_ns = sys.maxsize
+        self.again_s, self._due_ns = None, None
 
     def come(self) -> None:
         """Start it, if it never ran."""

@@ -304,7 +304,9 @@ class KilledCampaign(RuleBasedStateMachine):
     def _started(self) -> Supervised:
         arguments = (str(self._scenario), "--vary", "radio.loss=0,0.5", "--seeds", str(SEEDS), "--set", LONG, "--batch",
                      "2", "--out", str(self._campaign))  # fmt: skip
-        if (self._campaign / "campaign.json").exists():
+        if not (self._campaign / "campaign.json").exists():
+            shutil.rmtree(self._campaign, ignore_errors=True)  # of a sweep that was killed before its first run
+        else:
             arguments = ("--resume", str(self._campaign), "--retry-failed")
         command = (*PYTHON, "swarmwire.deploy", "sweep", *arguments, "--workers", "2", "--quiet")
         process = Supervised("sweep", lambda: command, self.folder / "sweep.log", self._env)

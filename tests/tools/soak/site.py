@@ -204,7 +204,7 @@ class Site:
             self._addresses[name] = match[1]
         return self._addresses.get(name)
 
-    def _process(self, name: str, command: Callable[[], Sequence[str]], again_s: float = 0.0) -> Supervised:
+    def _process(self, name: str, command: Callable[[], Sequence[str]], again_s: float | None = None) -> Supervised:
         return Supervised(name, command, self.log(name), self.env, again_s)
 
     def _world_command(self) -> Sequence[str]:

@@ -3,6 +3,7 @@
 A resumed campaign or tuning is compared with this provenance.
 """
 
+import shutil
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,15 +31,23 @@ from swarmwire.world.scenario.scenario import Scenario
 def new_folder(folder: Path, kind: str) -> Generator[Path]:
     """Make the folder of a campaign or a tuning, and yield the empty folder for its scenario.
 
-    BadInput unless `folder` is new or empty, and can be written.
+    The folder is empty again after an error within the context. BadInput unless `folder` is new or empty, and can be
+    written.
     """
     scenario_folder = folder / SCENARIO_FOLDER
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
-            raise BadInput("out", str(folder), f"expected a new or empty folder; to continue a {kind}: `resume`")
+            begun = f"to continue a {kind}: `resume`"
+            if scenario_folder.is_dir() and not (folder / f"{kind}.json").exists():
+                begun = f"a {kind} was interrupted here before its first run: remove {folder}"
+            raise BadInput("out", str(folder), f"expected a new or empty folder; {begun}")
         scenario_folder.mkdir()  # fails in all but one of several processes that begin here at once
-        yield scenario_folder
+        try:
+            yield scenario_folder
+        except BaseException:
+            shutil.rmtree(scenario_folder, ignore_errors=True)
+            raise
     except OSError as error:
         raise BadInput("out", str(folder), f"expected a folder that can be written: {error.strerror}") from error
 
