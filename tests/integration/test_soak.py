@@ -78,6 +78,8 @@ def test_soak_finds_a_robot_of_two_runners_or_of_none():
     assert invariants.check_owners(summary(JOINED, ("lost", "r0/1", ("b",), 4)), ROBOTS)  # a process of the host
     never_ready = ("lost", "r0", ROBOTS, 4), ("left", "r0", ROBOTS, 4, NOT_READY), ("returned", "r0", ROBOTS, 4)
     assert invariants.check_owners(summary(JOINED, *never_ready), ROBOTS)
+    before_ready = ("lost", "r0", ROBOTS, 4), ("restarted", "r0/0", ("a",), 4), ("returned", "r0", ROBOTS, 4)
+    assert invariants.check_owners(summary(JOINED, *before_ready), ROBOTS)
     for changes in (
         (JOINED, ("joined", "r1", ("a",), 4)),  # taken twice
         (JOINED, ("lost", "r1", ("a",), 4)),  # of another runner

@@ -55,9 +55,9 @@ def check_owners(
                 raise Broken(f"{change['runner']} {change['what']} with {robot}, which is none")
             host = change["runner"].partition("/")[0]  # without the process of a host
             expected = None if change["what"] in COMES else host
-            # A runner that joined, and went before its agents were ready, has no other event: it never played them.
-            may_be_unready = change["what"] == "lost" or (change["what"], change["reason"]) == ("left", NOT_READY)
-            never_ready = may_be_unready and owner[robot] is None
+            # A runner joins by its event only once its agents are ready; it may go, or restart a process, before that.
+            unready = change["what"] in ("lost", "restarted") or change["reason"] == NOT_READY
+            never_ready = unready and owner[robot] is None
             if owner[robot] not in (expected, SOMEBODY) and not never_ready:
                 raise Broken(f"{change['runner']} {change['what']} {robot}, which {owner[robot] or 'nobody'} played")
             if change["what"] != "restarted":  # a process of its host
