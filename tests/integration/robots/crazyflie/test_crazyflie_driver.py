@@ -3,10 +3,12 @@
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from threading import enumerate as enumerate_threads
 
 import numpy as np
 import psutil
 import pytest
+from cflib.crtp.udpdriver import UdpDriver
 
 from swarmwire.agent.drivers.crazyflie import CrazyflieDriver, CrazyflieOptions
 from swarmwire.agent.drivers.driver import Command, DriverLost, MotorsOff
@@ -143,6 +145,20 @@ def test_emergency_stop_of_an_operator_is_confirmed_and_the_agent_ends(room: Roo
             assert ask_all(session, SwarmKeys("swarm"), ESTOP, ["robot-0"], 30.0) == {"robot-0": "stopped"}
             command.process.terminate()
             assert command.wait()[0] == 0
+
+
+def test_no_ping_is_sent_while_the_link_closes(driver: CrazyflieDriver, monkeypatch) -> None:
+    pings: list[bool] = []
+    close = UdpDriver.close
+
+    def close_and_look(link: UdpDriver) -> None:
+        pings.append(any(thread.name == "ping_thread" for thread in enumerate_threads()))
+        close(link)
+
+    assert any(thread.name == "ping_thread" for thread in enumerate_threads())
+    monkeypatch.setattr(UdpDriver, "close", close_and_look)
+    driver.close()
+    assert pings == [False]
 
 
 def test_address_without_a_crazyflie_or_a_radio_is_lost_and_not_logged(room: Room, caplog) -> None:

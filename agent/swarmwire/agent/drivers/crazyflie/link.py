@@ -148,9 +148,13 @@ class CrazyflieLink:
 
     def close(self) -> None:
         """End the connection. cflib's threads end up to two seconds later; the radio is free before."""
-        closing = Thread(target=self._cf.close_link, name="crazyflie closes", daemon=True)
+        closing = Thread(target=self._close, name="crazyflie closes", daemon=True)
         closing.start()
         closing.join(CLOSE_S)
+
+    def _close(self) -> None:
+        self._cf.link_statistics.stop()  # before close_link, which would take the link from a ping that is being sent
+        self._cf.close_link()
 
     def _start_log(self, blocks: Sequence[Sequence[str]]) -> None:
         from cflib.crazyflie.log import LogConfig
