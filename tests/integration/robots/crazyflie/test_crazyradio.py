@@ -7,9 +7,7 @@ from typing import Any
 
 import cflib.crtp
 import pytest
-from cflib.crazyflie import Crazyflie
 from cflib.crazyflie.log import LogConfig
-from cflib.crazyflie.syncCrazyflie import SyncCrazyflie
 from cflib.crazyflie.syncLogger import SyncLogger
 from cflib.crtp.crtpstack import CRTPPacket
 from cflib.crtp.udpdriver import UdpDriver
@@ -19,6 +17,7 @@ from swarmwire.deploy import Recording, Simulation
 from swarmwire.deploy.runs.config import RunConfig
 from swarmwire.deploy.runs.plan import make_plan
 from swarmwire.world.scenario.scenario import Scenario
+from tests.integration.robots.crazyflie.test_crazyflie_gateway import connected_client
 from tests.support.clocks import until
 from tests.support.refusals import refused_input
 
@@ -101,7 +100,7 @@ def test_crazyradio_carries_a_clients_packets_as_fast_as_it_polls(flight: Flight
     clock, times_ns, stamps_ms = WallClock(), list[int](), list[int]()
     log = LogConfig(name="battery", period_in_ms=10)
     log.add_variable("pm.vbat", "float")
-    with SyncCrazyflie(flight.uris[0], cf=Crazyflie(rw_cache=str(tmp_path))) as scf, SyncLogger(scf, log) as logger:
+    with connected_client(flight.uris[0], tmp_path) as scf, SyncLogger(scf, log) as logger:
         for stamp_ms, values, _ in logger:
             times_ns.append(clock.now_ns())
             stamps_ms.append(stamp_ms)
