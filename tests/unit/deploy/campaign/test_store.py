@@ -1,14 +1,18 @@
 """What a sweep writes, statistics read: a campaign's folder by its writer, seen through its reader."""
 
+from contextlib import suppress
+
 import polars as pl
 import pytest
 
 from swarmwire.deploy.campaigns.columns import failure_line
+from swarmwire.deploy.campaigns.folder import new_folder
 from swarmwire.deploy.campaigns.store import CampaignWriter, StorageFailed
 from swarmwire.deploy.campaigns.worker import TaskResult
 from swarmwire.metrics.records.campaign.campaign_json import Campaign, Response, write_campaign
 from swarmwire.metrics.records.campaign.folder import CampaignFolder
 from swarmwire.metrics.records.run_folder.layout import CopiedFile
+from tests.support.refusals import refused_input
 
 CAMPAIGN = Campaign(
     name="loss",
@@ -132,3 +136,18 @@ CALLED = 'Traceback (most recent call last):\n  File "near.py", line 9, in step\
 )
 def test_failure_line_names_the_cause_of_a_failed_run(error, line):
     assert failure_line(error) == line
+
+
+def test_campaign_folder_is_empty_again_after_an_interrupted_start(tmp_path):
+    with suppress(KeyboardInterrupt), new_folder(tmp_path / "out", "campaign") as scenario_folder:
+        (scenario_folder / "scenario.toml").touch()
+        raise KeyboardInterrupt
+    with new_folder(tmp_path / "out", "campaign") as scenario_folder:
+        assert not [*scenario_folder.iterdir()]
+
+
+@pytest.mark.parametrize(("file", "advice"), [("campaign.json", "to continue"), ("scenario", "remove")])
+def test_campaign_folder_that_is_not_empty_is_refused_with_its_next_step(file, advice, tmp_path):
+    (tmp_path / file).mkdir()
+    with refused_input(key=str(tmp_path), match=advice), new_folder(tmp_path, "campaign"):
+        pass
