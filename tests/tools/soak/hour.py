@@ -153,6 +153,4 @@ def _undisturbed(site: Site) -> dict[str, int | None]:
     for name, process in site.observers.items():
         if name.endswith("calm"):
             pids[name.partition("-")[0]] = process.pid
-    if "page-calm" in site.observers:
-        pids["viewer"] = next(iter(site.viewers_of("page-calm")), None)
     return pids

@@ -33,17 +33,13 @@ def take_samples(path: Path, pids: Mapping[str, int | None], **shared: Any) -> N
 
 
 def growths(samples: pl.DataFrame) -> list[dict[str, Any]]:
-    """Medians of each quantity of each process in the first and the last stretch, and whether their growth is allowed.
-
-    Left out is the viewer, which keeps what it was shown, up to the 2 GB that it is given.
-    """
+    """Medians of each quantity of each process in the first and the last stretch, and whether it may grow so."""
     grown: list[dict[str, Any]] = []
     at_s, end_s = pl.col("at_s"), float(samples["at_s"].to_numpy().max())
     first = at_s.is_between(WARM_UP * end_s, (WARM_UP + STRETCH) * end_s, closed="left")
     last = at_s >= (1.0 - STRETCH) * end_s
     tick_cpu_ms = 1000.0 * pl.col("cpu_s").diff() / pl.col("tick").diff()
-    shown = samples.filter(~pl.col("process_name").str.ends_with("viewer"))
-    for (name,), rows in shown.group_by("process_name", maintain_order=True):
+    for (name,), rows in samples.group_by("process_name", maintain_order=True):
         timed = rows.with_columns(tick_cpu_ms=pl.when(pl.col("tick").diff() > 0).then(tick_cpu_ms))
         for quantity, column, limit in QUANTITIES + OF_WORLDS * str(name).endswith("world"):
             ends = [timed.filter(stretch)[column].drop_nulls().to_numpy() for stretch in (first, last)]

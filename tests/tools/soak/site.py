@@ -18,8 +18,16 @@ from swarmwire.comms.base.errors import SwarmwireError
 from swarmwire.deploy.live.remote_control import RemoteControl, controlling
 from swarmwire.deploy.runs.live_address import Live, read_live
 from tests.support.deploy.runs import WATCHER, processes_of
-from tests.tools.soak.processes import PYTHON, SCENARIO, Agenda, Steps, Supervised, family
+from tests.tools.soak.processes import PYTHON, SCENARIO, Agenda, Steps, Supervised
 
+# A page keeps the newest 2 GB of what it shows; with less, which it has within minutes, its memory must stay as it is.
+PAGE = """
+from swarmwire.deploy.cli.program import program
+from swarmwire.deploy.live.page import web_viewer
+
+web_viewer.LIVE_BYTES = 20_000_000
+program()
+"""
 AT_ONCE = 8  # runners that start at the same time
 EACH_S = 0.05  # a moment
 
@@ -180,11 +188,6 @@ class Site:
         except psutil.NoSuchProcess:
             return []
 
-    def viewers_of(self, name: str) -> list[int]:
-        """Processes that a page has started: the viewer."""
-        pid = self.observers[name].pid
-        return [process.pid for process in family(pid)] if pid else []
-
     def log(self, name: str) -> Path:
         """Log file of a process."""
         return self._at / f"{name}.log"
@@ -227,7 +230,7 @@ class Site:
         return (PYTHON[0], "-c", WATCHER, str(self.folder))
 
     def _page(self, _: str) -> Sequence[str]:
-        return (*PYTHON, "swarmwire.deploy", "ui", str(self.folder))
+        return (PYTHON[0], "-c", PAGE, "ui", str(self.folder))
 
     def _tab(self, name: str) -> Sequence[str]:
         return (*PYTHON, "tests.tools.soak.tab", str(self.log(name.replace("tab", "page"))))
