@@ -21,7 +21,7 @@ AGAIN = ["--reruns", "1", "--only-rerun", "ZError", "--only-rerun", "it did not 
 PLAIN = ["-p", "tests.tools.coverage.plain_kernels", "tests/unit/comms", "tests/unit/world"]
 THREADS = ["-p", "tests.tools.coverage.network_threads"]
 UNITS = [
-    *(f"tests/unit/{folder}" for folder in ("agent", "comms/wire", "world/backends")),
+    *(f"tests/unit/{folder}" for folder in ("agent", "comms/base/test_kernels.py", "comms/wire", "world/backends")),
     *map(str, Path("tests/unit/world").glob("test_*.py")),  # gateways, interfaces, …
 ]
 PROCESSES = [f"tests/integration/{part}" for part in ("agent", "robots", "comms", "world", "deploy/interfaces")]
